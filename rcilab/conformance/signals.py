@@ -181,8 +181,8 @@ class MotionSignals:
             return tau, np.diff(tau, axis=0, prepend=before) / CYCLE_TIME
         q, dq, _, jerk = self._differences
         joint, smooth = self._model.limits.joint, 0.0 if self._mode == "torque" else _SMOOTH_RATE
-        places = q[:: max(len(q) // 2, 1)]  # Start, middle and end; the greatest inertia counts.
-        inertia = np.max([np.abs(self._model.rigid_body.mass_matrix(place)) for place in places], axis=0)
+        poses = q[:: max(len(q) // 2, 1)]  # Start, middle and end; the greatest inertia counts.
+        inertia = np.max([np.abs(self._model.rigid_body.mass_matrix(pose)) for pose in poses], axis=0)
         weights = (inertia / joint.torque_rate[:, None]).max(axis=0)  # Of a joint's jerk, in the rate of any joint.
         change = np.einsum("j,jn->n", weights, np.abs(jerk.T))  # Not by BLAS, whose threads take longer to start.
         chosen = _rows_to_compute((change > smooth) | (np.abs(dq) > joint.velocity).any(axis=1))

@@ -395,9 +395,9 @@ def _without_pauses(index: NDArray[np.intp], q: JointPath) -> NDArray[np.intp]:
     for first, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
         if first == 0 or end == len(steps):
             continue
-        way, velocity = q[end] - q[first], (q[first] - q[first - 1] + q[end + 1] - q[end]) / 2.0
+        distance, velocity = q[end] - q[first], (q[first] - q[first - 1] + q[end + 1] - q[end]) / 2.0
         lengths = (end - first, steps[first:end].sum())  # [cycles] Without and with the pauses.
-        kept, whole = (np.abs(way - cycles * velocity).sum() for cycles in lengths)
+        kept, whole = (np.abs(distance - cycles * velocity).sum() for cycles in lengths)
         if kept < whole:
             steps[first:end] = 1
     return np.concatenate((index[:1], index[0] + np.cumsum(steps)))

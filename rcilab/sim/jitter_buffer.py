@@ -235,7 +235,7 @@ class JitterBuffer:
         """Returns the next command of the queue, and the number of cycles until it is due, 1 for now."""
         command = self._queue[0]
         if 1 < command.number - self._last_id <= LONGEST_GAP:
-            # States do not overtake so many others: this one was overtaken, in a burst. A slow motion cannot tell.
+            # States do not overtake so many others: this one was overtaken, in a burst. A slow motion does not show it.
             behind = islice(self._queue, SLACK, None)
             command = next((other for other in behind if other.number == self._last_id + 1), command)
         steps = 1 if command.number == self._last_id + 1 else self._steps_to(command, is_next)

@@ -210,8 +210,8 @@ def test_a_jump_at_the_end_of_a_run_is_a_violation_and_no_stop_is_written(tmp_pa
     assert main(["check", str(tmp_path / "a.rcirun"), "--slow-down", str(tmp_path / "b.npz")]) == 1
 
 
-def test_a_run_refused_at_its_second_command_is_judged_by_its_two_commands(tmp_path, capsys):
-    """Their jerk is that of one jump; commands that stayed there would have twice as much, the other way."""
+def test_a_run_refused_at_its_second_command_is_checked_by_its_two_commands(tmp_path, capsys):
+    """Their jerk is that of one jump; commands that stayed there would have twice as much, with the other sign."""
     jump = 1e-4  # [rad]
     cycles = some_cycles()[:2].copy()
     cycles["command"] = MODEL.home
@@ -224,7 +224,7 @@ def test_a_run_refused_at_its_second_command_is_judged_by_its_two_commands(tmp_p
     assert all(violation["worst_time"] < 0.0015 for violation in report["violations"])
 
 
-def test_of_a_run_whose_file_is_damaged_before_its_first_cycles_this_is_said(tmp_path, capsys):
+def test_a_run_whose_file_is_damaged_before_its_first_cycles_is_named_damaged(tmp_path, capsys):
     file = tmp_path / "a.rcirun"
     some_run().save(file)
     content = file.read_bytes()
@@ -235,7 +235,7 @@ def test_of_a_run_whose_file_is_damaged_before_its_first_cycles_this_is_said(tmp
     assert "there are no cycles in this run: the rest of its file is damaged" in capsys.readouterr().err
 
 
-def test_of_the_table_of_a_run_it_is_said_what_is_checked(tmp_path, capsys):
+def test_a_check_of_the_table_of_a_run_names_what_is_checked(tmp_path, capsys):
     some_run().save(tmp_path / "a.csv")
     main(["check", str(tmp_path / "a.csv"), "--model", MODEL.name])
     assert "its measured angles q are checked, without tool, load and box" in capsys.readouterr().out

@@ -114,7 +114,7 @@ def test_an_arm_of_six_axes_is_told_which_fault_it_cannot_have() -> None:
         assert not panel.provoke.disabled
 
 
-def test_an_error_without_a_scenario_is_shown_and_says_why_it_cannot_be_provoked() -> None:
+def test_an_error_without_a_scenario_is_shown_with_the_reason_why_it_cannot_be_provoked() -> None:
     with notebook.FaultPanel(rcilab.load_model("Panda")) as panel:
         assert len(panel.fault.options) == 41
         panel.fault.value = FrankaError.POWER_LIMIT_VIOLATION

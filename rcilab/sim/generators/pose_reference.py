@@ -44,7 +44,7 @@ class PoseReference:
     """Checks commanded poses and arm angles and returns their joint angles, on the present branch.
 
     The conditions apply to the client's commands, over the cycles between them. A wrong pose is not solved, except of
-    an arm with an elbow flip, whose maker names the errors of the joints beside those of the tool. Owned by a motion
+    an arm with an elbow flip, whose maker names the errors of the joints and of the tool together. Owned by a motion
     generator.
 
     Attributes:

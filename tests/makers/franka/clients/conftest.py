@@ -23,7 +23,7 @@ class Served:
     """A running controller.
 
     Attributes:
-        host: Its address, all that a client is told.
+        host: Its address, all that a client is given.
         model: Its arm.
         world: What happens to the arm.
     """
@@ -40,7 +40,7 @@ class Served:
                 return True
             return False
 
-        wait_for(is_placed, what="the arm at rest")
+        wait_for(is_placed, what="the arm at standstill")
 
 
 @contextmanager

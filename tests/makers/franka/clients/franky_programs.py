@@ -189,7 +189,7 @@ def callbacks(host: str, hold: int) -> np.ndarray:
 
 
 def reused_motion(host: str, near: np.ndarray, home: np.ndarray) -> list[str]:
-    """Returns the errors of a motion that is run again, at rest and in place of another one."""
+    """Returns the errors of a motion that is run again, at standstill and instead of another one."""
     robot, errors = open_robot(host), []
     used = franky.JointWaypointMotion([franky.JointWaypoint(near)])
     robot.move(used)

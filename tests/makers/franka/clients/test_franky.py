@@ -60,7 +60,7 @@ def test_every_joint_moves_to_goals_on_both_sides(run: Callable[..., Any]) -> No
         np.testing.assert_allclose(found, goal, atol=JOINTS)
 
 
-def test_joints_move_the_way_of_their_velocities(run: Callable[..., Any]) -> None:
+def test_joints_move_by_their_velocities(run: Callable[..., Any]) -> None:
     rates = 0.1 * np.array([[1, 1, 1, 1, 1, 1, 1], [-1, -1, -1, 1, -1, 1, -1], [1, -1, 1, -1, 1, -1, 1]])
     for rate, moved in zip(rates, run("joint_velocities", rates.tolist(), 300), strict=True):
         np.testing.assert_allclose(moved, 0.35 * rate, atol=0.01)
@@ -73,7 +73,7 @@ def test_the_tool_moves_along_every_axis(run: Callable[..., Any]) -> None:
         np.testing.assert_allclose(moved[:3, :3], np.zeros((3, 3)), atol=0.02)
 
 
-def test_the_tool_moves_the_way_of_its_velocities(run: Callable[..., Any]) -> None:
+def test_the_tool_moves_by_its_velocities(run: Callable[..., Any]) -> None:
     rates = along_axes(0.02)
     for rate, moved in zip(rates, run("tool_velocities", rates, 300), strict=True):
         np.testing.assert_allclose(moved, 0.31 * np.array(rate), atol=0.002)
@@ -87,7 +87,7 @@ def test_cartesian_impedance_ends_near_its_goal(run: Callable[..., Any]) -> None
     np.testing.assert_allclose(run("cartesian_impedance", [0.05, 0.05, 0.0])[:3, 3], np.zeros(3), atol=TOOL)
 
 
-def test_a_posture_is_pursued_beside_the_tool(run: Callable[..., Any]) -> None:
+def test_a_posture_is_approached_while_the_tool_moves(run: Callable[..., Any]) -> None:
     one = run("posture", np.array([0.1, 0, 0, 0, 0, 0, 0]), np.array([100.0, 0, 0, 0, 0, 0, 0]), 1.5)
     assert one["joints"][0] == pytest.approx(0.1, abs=0.05)
     np.testing.assert_allclose(one["gains"], [100.0, 0, 0, 0, 0, 0, 0])

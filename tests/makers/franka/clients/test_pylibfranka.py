@@ -27,7 +27,7 @@ def arm() -> Iterator[Served]:
 
 @pytest.fixture(scope="module")
 def client(arm: Served) -> Any:
-    """A client; its library has no way to close it before it is collected."""
+    """A client; its library cannot close it before it is collected."""
     with kept_scheduling():
         return franka.Robot(arm.host, franka.RealtimeConfig.kIgnore)
 
@@ -49,7 +49,7 @@ def controller(name: str) -> Any:
 
 
 def swing(t: float, duration: float, height: float) -> float:
-    """A path there and back, at rest at both ends."""
+    """A path there and back, with standstill at both ends."""
     return height / 2.0 * (1.0 - np.cos(2.0 * np.pi * t / duration))
 
 
@@ -66,7 +66,7 @@ def loop(control: Any, duration: float, command: Callable[[Any, float, Any], Any
     return states
 
 
-def test_the_state_is_that_of_an_arm_at_rest(robot: Any, arm: Served) -> None:
+def test_the_state_is_that_of_an_arm_at_standstill(robot: Any, arm: Served) -> None:
     first, second = robot.read_once(), robot.read_once()
     assert second.time.to_sec() > first.time.to_sec()
     assert second.robot_mode == franka.RobotMode.Idle

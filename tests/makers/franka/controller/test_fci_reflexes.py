@@ -143,7 +143,7 @@ STEADY = 3.0  # [rad/s^2] Acceleration of joint 1 before cycles are lost.
 
 @pytest.mark.parametrize("lost", [1, 3, 10])
 @pytest.mark.parametrize(("share", "errors"), [(0.9, ()), (1.01, (14,)), (2.5, (14,))])
-def test_after_lost_cycles_the_next_angles_are_judged_from_those_of_the_state(
+def test_after_lost_cycles_the_next_angles_are_checked_from_those_of_the_state(
     robot: Robot, place: FciArena, lost: int, share: float, errors: tuple[int, ...]
 ) -> None:
     limits = place.controller.model.limits.joint
@@ -182,7 +182,7 @@ def test_after_lost_cycles_a_torque_may_change_by_no_more_than_in_one_cycle(
 
 
 @pytest.mark.parametrize(("share", "errors"), [(0.15, ()), (1.5, (20,))])
-def test_after_lost_cycles_the_next_pose_is_judged_from_that_of_the_state(
+def test_after_lost_cycles_the_next_pose_is_checked_from_that_of_the_state(
     robot: Robot, place: FciArena, share: float, errors: tuple[int, ...]
 ) -> None:
     start = state = robot.move(wire.JOINT_IMPEDANCE, wire.CARTESIAN_POSE)

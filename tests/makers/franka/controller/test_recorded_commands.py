@@ -12,7 +12,7 @@ from rcilab.makers.franka.controller.fci_controller import FciController
 from rcilab.makers.franka.controller.phases import Phase
 from rcilab.makers.franka.wire.command_packet import CommandPacket
 from rcilab.makers.franka.wire.requests import AsyncMove, Move
-from rcilab.makers.franka.wire.versions import VERSION_5, VERSION_10, Status
+from rcilab.makers.franka.wire.versions import VERSION_5, VERSION_10, FciVersion, Status
 from rcilab.model.robot_model import load_model
 from rcilab.recording.client_motions import ClientMotions
 from rcilab.recording.playout import played_commands
@@ -29,6 +29,14 @@ SPEED = 0.05  # [rad/s] and [m/s]
 DEVIATION = (0.1,) * 3
 
 
+def recorded(name: str, version: FciVersion) -> tuple[FciController, CycleCapture, ClientMotions, CycleRing]:
+    """A controller with the record of its cycles, and the reader of that."""
+    model = load_model(name)
+    controller = FciController(VirtualArm(model, build_plant("ideal", model), prefill=0), version)
+    ring = CycleRing.create(7, {"model": name, "plant": "ideal", "url": "fci://127.0.0.1", "realtime": False})
+    return controller, CycleCapture(ring, controller), ClientMotions(ring), ring
+
+
 def packet(number: int, generator: int, size: float, start: tuple[float, ...], *, is_last: bool) -> CommandPacket:
     """A command of joint 7, or of the tool along z."""
     q = (*start[:6], start[6] + 0.02)
@@ -38,11 +46,8 @@ def packet(number: int, generator: int, size: float, start: tuple[float, ...], *
 
 @pytest.mark.parametrize("generator", list(FIELDS))
 def test_the_record_has_velocities_and_goals_and_its_check_the_angles_that_follow(generator: int) -> None:
-    model = load_model("FR3")
-    controller = FciController(VirtualArm(model, build_plant("ideal", model), prefill=0), VERSION_10)
-    facts = {"model": "FR3", "plant": "ideal", "url": "fci://127.0.0.1", "realtime": False}
-    ring = CycleRing.create(7, facts)
-    capture, motions = CycleCapture(ring, controller), ClientMotions(ring)
+    controller, capture, motions, ring = recorded("FR3", VERSION_10)
+    model = controller.model
     start = tuple(controller.state.q_c.tolist())
     is_goal = generator == 0
     move = AsyncMove(0, generator, DEVIATION, DEVIATION, is_goal, (0.5,) * 7)
@@ -86,10 +91,7 @@ def test_the_record_has_velocities_and_goals_and_its_check_the_angles_that_follo
 
 
 def test_a_motion_that_follows_at_once_is_another_one_in_the_record() -> None:
-    model = load_model("FR3")
-    controller = FciController(VirtualArm(model, build_plant("ideal", model), prefill=0), VERSION_10)
-    ring = CycleRing.create(7, {"model": "FR3", "plant": "ideal", "url": "fci://127.0.0.1", "realtime": False})
-    capture, motions = CycleCapture(ring, controller), ClientMotions(ring)
+    controller, capture, motions, ring = recorded("FR3", VERSION_10)
     start = tuple(controller.state.q_c.tolist())
     for generator in (1, 3, 3, 1):
         assert controller.begin_move(AsyncMove(0, generator, DEVIATION, DEVIATION, False, (0.5,) * 7)) is (
@@ -110,12 +112,9 @@ def test_a_motion_that_follows_at_once_is_another_one_in_the_record() -> None:
     ring.close()
 
 
-def test_torques_beside_a_generator_at_rest_are_judged_by_what_the_arm_did() -> None:
+def test_torques_with_a_generator_at_standstill_are_checked_by_the_measured_angles() -> None:
     """A client of version 5 cannot command torques alone: it sends zero velocities with them."""
-    model = load_model("Panda")
-    controller = FciController(VirtualArm(model, build_plant("ideal", model), prefill=0), VERSION_5)
-    ring = CycleRing.create(7, {"model": "Panda", "plant": "ideal", "url": "fci://127.0.0.1", "realtime": False})
-    capture, motions = CycleCapture(ring, controller), ClientMotions(ring)
+    controller, capture, motions, ring = recorded("Panda", VERSION_5)
     assert controller.begin_move(Move(2, 1, DEVIATION, DEVIATION)) is Status.MOTION_STARTED
     start, cycles = tuple(controller.state.q_c.tolist()), 300
     for k in range(cycles):
