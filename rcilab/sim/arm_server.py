@@ -171,6 +171,8 @@ class ArmServer:
         if not ipaddress.ip_address(self.host).is_loopback:
             text = f"warning: {self.host} is reachable from outside this machine, where others can move this arm"
             self._log.write("warning", text, host=self.host)
+        if self._endpoint.warning:
+            self._log.write("warning", self._endpoint.warning)
         if self.config.realtime:
             warning = enter_realtime(PRIORITY).warning
             if warning is not None and not self.config.lockstep:

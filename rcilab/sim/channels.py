@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol, TypeAlias
 
 LOWEST_CLIENT_PORT = 1024  # Lowest port that datagrams are sent to; ports below are privileged.
@@ -51,6 +52,9 @@ class TcpChannel:
     """Largest number of simultaneous clients; further ones are refused."""
     option: str = "--port"
     """Command line option that changes the port, for an error message."""
+    socket_path: Path | None = None
+    """Unix-domain socket that clients on this machine try before the port; it is opened if the user may not open a port
+    of the controller."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

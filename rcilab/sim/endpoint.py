@@ -8,6 +8,7 @@ import socket
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from rcilab.core.errors import DecodeError, UsageError
 from rcilab.sim.arrivals import (
@@ -31,6 +32,7 @@ _UNKNOWN_AT_ONCE = 64  # The same for the shared socket once the client has its 
 _UNKNOWN_POLL_INTERVAL = 16  # [polls] Between reads of the shared socket, from then on.
 _FRAME_BYTES_AT_ONCE = 4096
 _BACKLOG = 8  # [connections] Waiting to be accepted.
+_ALLOW = "sysctl net.ipv4.ip_unprivileged_port_start={}"
 _ATTEMPTS = 20  # To find a port number that is free for both TCP and UDP.
 
 
@@ -46,6 +48,7 @@ class Endpoint:
     Attributes:
         host: Address that it listens on.
         port: TCP port of the main channel.
+        warning: What the user should know about the channels; "" without anything.
         unknown_senders: Datagrams that were ignored because they did not come from the client; of a flood, only those
             that were read: the kernel drops the rest if its buffer is full.
 
@@ -61,9 +64,11 @@ class Endpoint:
 
     def __init__(self, host: str, channels: Sequence[Channel], client: tuple[str, int | None] | None = None) -> None:
         self._listeners, self._datagrams = _open(_resolve(host), channels)
+        self._main = next(channel for channel in channels if isinstance(channel, TcpChannel))
         main = next(iter(self._listeners))
-        self.host, self.port = main.getsockname()
-        self._main = self._listeners[main]
+        has_port = main.family is socket.AF_INET and self._listeners[main] is self._main
+        self.host, self.port = main.getsockname() if has_port else (_resolve(host), self._main.port)
+        self.warning = "" if has_port else _describe_socket(self._main)
         udp = next((channel for channel in channels if isinstance(channel, UdpChannel)), None)
         self._own_port = self.port if udp is None or udp.target_port is None else udp.target_port
         self._state_port = self._own_port
@@ -92,7 +97,7 @@ class Endpoint:
         found = [
             (channel.name, listener.getsockname()[1], channel.default_port)
             for listener, channel in self._listeners.items()
-            if channel is not self._main
+            if channel is not self._main and listener.family is socket.AF_INET
         ]
         if self._datagrams is not None:
             sock, channel = self._datagrams
@@ -216,7 +221,7 @@ class Endpoint:
     def close(self) -> None:
         """Closes every socket."""
         for sock in self._watched:
-            sock.close()
+            _close(sock)
         self._connections.clear()
         self._sockets.clear()
         self._ports.clear()
@@ -342,16 +347,19 @@ class Endpoint:
     def _accept(self, listener: socket.socket) -> None:
         channel = self._listeners[listener]
         try:
-            sock, (address, _) = listener.accept()
+            sock, name = listener.accept()
         except OSError:  # It has already disconnected.
             return
+        is_local = listener.family is socket.AF_UNIX
+        address = "127.0.0.1" if is_local else name[0]
         clients = [peer for peer in self._sockets if peer.channel is channel]
         if len(clients) >= channel.max_clients:
             sock.close()
             self._arrivals.append(ClientRefused(address, ", ".join(client.address for client in clients)))
             return
         sock.setblocking(False)
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if not is_local:
+            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         peer = Peer(address, channel)
         self._connections[sock] = _Connection(peer, channel.open_framer())
         self._sockets[peer] = sock
@@ -374,7 +382,7 @@ def _open(
             return _open_once(address, channels, sockets)
         except UsageError:
             for sock in sockets:
-                sock.close()
+                _close(sock)
             if attempts <= 0:
                 raise
 
@@ -385,9 +393,22 @@ def _open_once(
     """Opens every channel; `sockets` receives the open ones, also if a later one cannot be opened."""
     listeners: dict[socket.socket, TcpChannel] = {}
     datagrams: tuple[socket.socket, UdpChannel] | None = None
+    is_denied = False
     for channel in channels:
-        if isinstance(channel, TcpChannel):
+        if not isinstance(channel, TcpChannel):
+            continue
+        try:
             sock = _bind(socket.SOCK_STREAM, address, channel.port, channel.option)
+        except UsageError as error:
+            if not isinstance(error.__cause__, PermissionError) or channel.socket_path is None:
+                raise
+            is_denied = True
+            continue
+        sockets.append(sock)
+        listeners[sock] = channel
+    for channel in channels if is_denied else ():
+        if isinstance(channel, TcpChannel) and channel.socket_path is not None:
+            sock = _bind_path(channel.socket_path, channel.port)
             sockets.append(sock)
             listeners[sock] = channel
     main = next(iter(listeners))
@@ -420,6 +441,40 @@ def _bind(kind: socket.SocketKind, address: str, port: int, option: str, *, shar
     return sock
 
 
+def _bind_path(path: Path, port: int) -> socket.socket:
+    """Returns a Unix-domain socket; a file that a killed controller has left is replaced."""
+    sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+            if probe.connect_ex(str(path)) == errno.ECONNREFUSED:
+                path.unlink()
+        sock.bind(str(path))
+    except OSError as error:
+        sock.close()
+        reason = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be used ({error.strerror})"
+        raise UsageError(
+            f"TCP port {port} needs privileges, and {path}, which clients on this machine use instead, {reason}; stop "
+            f"the other controller, start as root, or allow the port: {_ALLOW.format(port)}"
+        ) from error
+    return sock
+
+
+def _close(sock: socket.socket) -> None:
+    """Closes a socket, and removes the file of a Unix-domain one that listens."""
+    name = sock.getsockname() if sock.family is socket.AF_UNIX else ""
+    sock.close()
+    if name:
+        Path(name).unlink(missing_ok=True)
+
+
+def _describe_socket(channel: TcpChannel) -> str:
+    return (
+        f"TCP port {channel.port} needs privileges: clients on this machine connect by {channel.socket_path}, whatever "
+        "address they name; for other clients, or several controllers, start as root or allow the port: "
+        + _ALLOW.format(channel.port)
+    )
+
+
 def _explain(error: OSError, kind: socket.SocketKind, address: str, port: int, option: str) -> str:
     name = "TCP" if kind is socket.SOCK_STREAM else "UDP"
     if error.errno == errno.EADDRINUSE:
@@ -434,7 +489,10 @@ def _explain(error: OSError, kind: socket.SocketKind, address: str, port: int, o
             "controller where that address is: ip netns exec NAME rcilab controller …"
         )
     if error.errno == errno.EACCES:
-        return f"{name} port {port} needs privileges; choose one above 1023 with {option} N"
+        return (
+            f"{name} port {port} needs privileges; choose one above 1023 with {option} N, start as root, or allow the "
+            f"port: {_ALLOW.format(port)}"
+        )
     return f"{name} port {port} on {address} cannot be used: {error.strerror}; choose others with --host and {option}"
 
 

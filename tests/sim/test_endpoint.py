@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from rcilab.core.clock import SystemClock
+from rcilab.core.errors import UsageError
 from rcilab.sim.api import NetworkFaults
 from rcilab.sim.arrivals import Arrival, ClientConnected, DatagramArrived, UnknownSenderDetected
 from rcilab.sim.channels import Peer, TcpChannel, UdpChannel
@@ -122,3 +125,68 @@ def test_network_faults_do_not_reach_the_gripper(endpoint: Endpoint, arm: Client
     arm.udp.setblocking(False)
     with pytest.raises(BlockingIOError):
         arm.udp.recv(100)
+
+
+@pytest.fixture
+def denied(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Port 502 needs privileges that this user has not."""
+    bind = socket.socket.bind
+
+    def refuse(sock: socket.socket, address: tuple[str, int] | str) -> None:
+        if address == ("127.0.0.3", 502):
+            raise PermissionError(13, "Permission denied")
+        bind(sock, address)
+
+    monkeypatch.setattr(socket.socket, "bind", refuse)
+
+
+def channels(folder: Path) -> tuple[TcpChannel, TcpChannel]:
+    return (
+        TcpChannel(protocol="arm", port=502, socket_path=folder / "arm", max_clients=2),
+        TcpChannel(name="report_port", protocol="reports", port=0, socket_path=folder / "reports"),
+    )
+
+
+def test_without_privileges_clients_connect_by_unix_sockets(denied: None, tmp_path: Path) -> None:
+    endpoint = Endpoint("127.0.0.3", channels(tmp_path))
+    assert (endpoint.host, endpoint.port) == ("127.0.0.3", 502)
+    assert "sysctl net.ipv4.ip_unprivileged_port_start=502" in endpoint.warning
+    for name in ("arm", "reports", "arm"):
+        with socket.socket(socket.AF_UNIX) as client:
+            client.connect(str(tmp_path / name))
+            arrival = poll(endpoint)[-1]
+            assert isinstance(arrival, ClientConnected)
+            endpoint.send_frame(arrival.peer, b"hello")
+            assert client.recv(100) == b"hello"
+            assert arrival.peer.channel.protocol == ("arm" if name == "arm" else "reports")
+    endpoint.close()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_second_controller_without_privileges_is_told_its_ways(denied: None, tmp_path: Path) -> None:
+    first = Endpoint("127.0.0.3", channels(tmp_path))
+    with pytest.raises(UsageError, match=r"502 needs privileges, and .*arm.* is in use; stop .*, start as root, or"):
+        Endpoint("127.0.0.3", channels(tmp_path))
+    first.close()
+
+
+def test_the_file_of_a_killed_controller_is_replaced(denied: None, tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as killed:
+        killed.bind(str(tmp_path / "arm"))
+    endpoint = Endpoint("127.0.0.3", channels(tmp_path))
+    with socket.socket(socket.AF_UNIX) as client:
+        client.connect(str(tmp_path / "arm"))
+    endpoint.close()
+
+
+def test_with_a_free_port_no_unix_socket_is_opened(tmp_path: Path) -> None:
+    arm, reports = channels(tmp_path)
+    endpoint = Endpoint("127.0.0.3", (replace(arm, port=0), reports))
+    assert not list(tmp_path.iterdir())
+    assert endpoint.warning == ""
+    endpoint.close()
+
+
+def test_a_port_that_needs_privileges_has_two_ways_on(denied: None) -> None:
+    with pytest.raises(UsageError, match="above 1023 with --port N, start as root, or allow the port"):
+        Endpoint("127.0.0.3", [TcpChannel(protocol="arm", port=502)])
