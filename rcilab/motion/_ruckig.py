@@ -100,7 +100,7 @@ def plan_standstill(
 
 
 class Stepper:
-    """Moves every axis independently and time-optimally towards a velocity or a position, one cycle per call.
+    """Moves every axis time-optimally towards a velocity or a position, one cycle per call.
 
     Owned by the thread that runs the cycle. Ruckig computes a new curve only after a change of target or state.
 
@@ -115,6 +115,7 @@ class Stepper:
         ddq: Accelerations, [rad/s^2].
         acceleration: Bounds, [rad/s^2].
         jerk: Bounds, [rad/s^3].
+        is_synchronized: Whether all axes arrive together, on a straight line where their state allows it.
     """
 
     def __init__(
@@ -124,12 +125,14 @@ class Stepper:
         ddq: Sequence[float],
         acceleration: Sequence[float],
         jerk: Sequence[float],
+        *,
+        is_synchronized: bool = False,
     ) -> None:
         n = len(q)
         self._ruckig = ruckig.Ruckig(n, CYCLE_TIME)
         self._out = ruckig.OutputParameter(n)
         problem = ruckig.InputParameter(n)
-        problem.synchronization = ruckig.Synchronization.No
+        problem.synchronization = ruckig.Synchronization.Phase if is_synchronized else ruckig.Synchronization.No
         problem.control_interface = _VELOCITY
         self._by_velocity = True
         self._standstill = [0.0] * n
@@ -191,6 +194,66 @@ class Stepper:
             return self._ruckig.update(self._problem, self._out) in (Result.Working, Result.Finished)
         except (ruckig.RuckigError, ValueError):  # ValueError: a result that its Python binding does not know.
             return False
+
+
+class PathStepper:
+    """Advances a path length time-optimally to a place with a given velocity there, one cycle per call.
+
+    Owned by the thread that runs the cycle. Past the place it continues with that velocity.
+
+    Attributes:
+        s: Current path length, in the unit of the path.
+        ds: Its velocity, in that unit per second.
+        dds: Its acceleration.
+
+    Args:
+        s: Path length at the start.
+        ds: Velocity at the start.
+        dds: Acceleration at the start.
+    """
+
+    def __init__(self, s: float = 0.0, ds: float = 0.0, dds: float = 0.0) -> None:
+        self.s: float = s
+        self.ds: float = ds
+        self.dds: float = dds
+        self._ruckig = ruckig.Ruckig(1, CYCLE_TIME)
+        self._out = ruckig.OutputParameter(1)
+        problem = ruckig.InputParameter(1)
+        problem.current_position, problem.current_velocity, problem.current_acceleration = [s], [ds], [dds]
+        self._problem = problem
+
+    def aim_at(self, s: float, ds: float, velocity: float, acceleration: float, jerk: float) -> None:
+        """Moves to a place from the next step on.
+
+        Args:
+            s: The place, in the unit of the path.
+            ds: Velocity there, 0 to `velocity`.
+            velocity: Bound on the way, above zero.
+            acceleration: Bound, above zero.
+            jerk: Bound, above zero.
+        """
+        problem = self._problem
+        problem.control_interface = _POSITION
+        problem.target_position, problem.target_velocity = [s], [ds]
+        problem.max_velocity, problem.max_acceleration, problem.max_jerk = [velocity], [acceleration], [jerk]
+
+    def brake(self, acceleration: float, jerk: float) -> None:
+        """Stops from the next step on, inside these bounds, above zero."""
+        problem = self._problem
+        problem.control_interface = _VELOCITY
+        problem.target_velocity, problem.max_acceleration, problem.max_jerk = [0.0], [acceleration], [jerk]
+
+    def step(self) -> bool:
+        """Advances one cycle; returns False, and does not move, where ruckig finds no curve."""
+        out = self._out
+        try:
+            if self._ruckig.update(self._problem, out) not in (Result.Working, Result.Finished):
+                return False
+        except (ruckig.RuckigError, ValueError):  # As in `Stepper`.
+            return False
+        (self.s,), (self.ds,), (self.dds,) = out.new_position, out.new_velocity, out.new_acceleration
+        out.pass_to_input(self._problem)
+        return True
 
 
 _REASONS: dict[Any, str] = {

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -19,7 +20,6 @@ from rcilab.core.spatial import Pose, wxyz_from_rotation
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.hermite import DIFFERENCE_STEP, State, central_state, evaluate, quintic
 from rcilab.motion.path import Path
-from rcilab.motion.segment import Segment
 
 _SAMPLES = 33
 """Number of points at which half a segment, or a blend, is sampled; tuning value."""
@@ -30,6 +30,23 @@ _RADIUS_MARGIN = 0.999
 
 LENGTH = 1.0
 """Length of every blend in the spline's parameter s; the corner is in the middle."""
+
+
+class Side(Protocol):
+    """A path that ends, or begins, at a corner, as a function of its share."""
+
+    @property
+    def path(self) -> Path | None:
+        """Path of the tool; None is a path of the joints."""
+        ...
+
+    def positions(self, model: RobotModel, shares: Array) -> Array:
+        """Returns positions of the tool, shape (N, 3), [m], at many shares, shape (N,)."""
+        ...
+
+    def state(self, model: RobotModel, share: float) -> State:
+        """Returns joint angles and their first two derivatives by the share, each of shape (n,)."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -58,13 +75,12 @@ class Blend:
         return T, values[:, 6]
 
 
-def build_blend(model: RobotModel, before: Segment, after: Segment) -> Blend:
-    """Returns the blend at the waypoint of `before`, with the requested radius or the largest that fits.
+def build_blend(model: RobotModel, before: Side, after: Side, radius: float) -> Blend:
+    """Returns the blend at the end of `before`, with the requested radius, [m], or the largest that fits.
 
     A blend takes at most half of either segment, as on an industrial controller. The radius is the same on both sides
     of the corner, unless the tool does not move on one of them.
     """
-    radius = before.waypoint.blend
     corner = after.positions(model, np.zeros(1))[0]
     halves = _distances(model, before, corner, -1.0), _distances(model, after, corner, 1.0)
     moving = [float(half.max()) for half in halves if half.max() > _MIN_TRAVEL]
@@ -93,7 +109,7 @@ def rotations(vectors: Array) -> Array:
     return np.eye(3) + a[:, None, None] * K + b[:, None, None] * (K @ K)
 
 
-def _distances(model: RobotModel, segment: Segment, corner: Array, side: float) -> Array:
+def _distances(model: RobotModel, segment: Side, corner: Array, side: float) -> Array:
     """Returns the tool's distances from the corner, from there to the middle of a segment, shape (N,), [m]."""
     shares = np.linspace(0.0, 0.5, _SAMPLES) if side > 0.0 else np.linspace(1.0, 0.5, _SAMPLES)
     return np.sqrt(((segment.positions(model, shares) - corner) ** 2).sum(axis=1))
@@ -109,9 +125,7 @@ def _cut(distances: Array, radius: float) -> float:
     return float(i - 1 + part) * 0.5 / (len(distances) - 1)
 
 
-def _blend(
-    model: RobotModel, before: Segment, after: Segment, exit_share: float, entry_share: float, radius: float
-) -> Blend:
+def _blend(model: RobotModel, before: Side, after: Side, exit_share: float, entry_share: float, radius: float) -> Blend:
     rates = 2.0 * (1.0 - exit_share) / LENGTH, 2.0 * entry_share / LENGTH
     if before.path is not None and after.path is not None:
         corner = before.path.goal

@@ -229,7 +229,7 @@ def _plan_run(
     if len(run) > 1:
         blends: list[Blend] = []
         for before, after in pairwise(run):
-            blends.append(build_blend(model, before, after))
+            blends.append(build_blend(model, before, after, before.waypoint.blend))
             report(_BLEND_SHARE * len(blends) / len(run))
         for before, blend in zip(run[:-1], blends, strict=True):
             requested = before.waypoint.blend

@@ -193,7 +193,7 @@ def test_every_pair_of_types_blends_inside_the_radius(name, seed, first, second,
     except PlanningError:
         assume(False)
     assume(not before.is_stationary and not after.is_stationary)
-    blend = build_blend(model, before, after)
+    blend = build_blend(model, before, after, before.waypoint.blend)
     assert 0.0 < blend.radius <= radius
     assert 0.5 <= blend.exit_share <= 1.0
     assert 0.0 <= blend.entry_share <= 0.5

@@ -1,0 +1,157 @@
+"""The motion along a path: its length as a function of time, which may stop, continue and slow down at any time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from rcilab.motion import _ruckig
+from rcilab.sim.planner.velocity_change import change_distance, fastest_after, fastest_before, slowest_after
+
+_ROUNDING = 1.0 - 1e-9  # ruckig refuses a target velocity above its bound.
+_SMALLEST = 1e-9  # Part of a stretch's velocity below which the law stands.
+
+
+class Stretch(NamedTuple):
+    """A part of the path with constant bounds."""
+
+    end: float
+    """Path length at its end."""
+    velocity: float
+    """Bound, above zero, per second."""
+    acceleration: float
+    """Bound, above zero."""
+    jerk: float
+    """Bound, above zero."""
+
+
+class PathLaw:
+    """Moves along stretches, each with its own bounds, without a stop between them, to standstill at the last end.
+
+    At the end of a stretch the acceleration is zero, and the velocity as high as both stretches and those ahead allow.
+    Stretches may be appended or replaced, also the present one, as long as a stop before the last end stays possible.
+    Owned by the thread of the cycle.
+    """
+
+    def __init__(self) -> None:
+        self._line = _ruckig.PathStepper()
+        self._stretches: list[Stretch] = []
+        self._junctions: list[float] = []  # Velocity at the end of each stretch.
+        self._override = 1.0
+        self._is_braking = False
+
+    @property
+    def s(self) -> float:
+        """Path length."""
+        return self._line.s
+
+    @property
+    def ds(self) -> float:
+        """Velocity, per second."""
+        return self._line.ds
+
+    @property
+    def dds(self) -> float:
+        """Acceleration."""
+        return self._line.dds
+
+    @property
+    def is_stationary(self) -> bool:
+        """Whether it stands."""
+        velocity, acceleration = self._scale
+        return abs(self._line.ds) < _SMALLEST * velocity and abs(self._line.dds) < _SMALLEST * acceleration
+
+    @property
+    def is_at_end(self) -> bool:
+        """Whether it stands at the end of the last stretch, or there is none."""
+        return not self._stretches
+
+    def reset(self) -> None:
+        """Begins a new path, at standstill at length zero."""
+        self._line = _ruckig.PathStepper()
+        self._stretches, self._junctions = [], []
+        self._is_braking = False
+
+    def set_stretches(self, stretches: Sequence[Stretch]) -> None:
+        """Replaces everything ahead; the first stretch contains the present length."""
+        self._stretches = list(stretches)
+        self._plan()
+
+    def set_override(self, part: float) -> None:
+        """Multiplies every velocity bound from now on; above 0, up to 1."""
+        if part != self._override:
+            self._override = part
+            self._plan()
+
+    def pause(self) -> None:
+        """Stops inside the bounds of the stretch, on the path."""
+        self._is_braking = True
+        self._aim()
+
+    def resume(self) -> None:
+        """Continues from the present state."""
+        self._is_braking = False
+        self._plan()
+
+    def step(self) -> float:
+        """Advances one cycle and returns the path length."""
+        line = self._line
+        if not self._stretches:
+            return line.s
+        if not line.step():
+            _, _, acceleration, jerk = self._stretches[0]
+            line.brake(acceleration, jerk)
+            line.step()
+            self._plan()
+        stretches = self._stretches
+        while len(stretches) > 1 and line.s >= stretches[0].end:
+            del stretches[0], self._junctions[0]
+            self._aim()
+        if len(stretches) == 1 and not self._is_braking:
+            end = stretches[0].end
+            if line.s >= end - _SMALLEST * (1.0 + abs(end)) and self.is_stationary:
+                self._stretches, self._junctions = [], []
+                self._line = _ruckig.PathStepper(end)
+        return self._line.s
+
+    @property
+    def _scale(self) -> tuple[float, float]:
+        if not self._stretches:
+            return 1.0, 1.0
+        _, velocity, acceleration, _ = self._stretches[0]
+        return velocity, acceleration
+
+    def _plan(self) -> None:
+        """Computes the velocities at the ends of the stretches: backwards from standstill, then forwards."""
+        stretches, line = self._stretches, self._line
+        if not stretches:
+            return
+        caps = [self._override * stretch.velocity for stretch in stretches]
+        junctions = [0.0] * len(stretches)
+        for k in range(len(stretches) - 2, -1, -1):
+            _, _, acceleration, jerk = stretches[k + 1]
+            length = stretches[k + 1].end - stretches[k].end
+            reachable = fastest_before(junctions[k + 1], length, acceleration, jerk)
+            junctions[k] = _ROUNDING * min(caps[k], caps[k + 1], reachable)
+        v, a, s = line.ds, line.dds, line.s
+        for k, (end, _, acceleration, jerk) in enumerate(stretches[:-1]):
+            length = end - s
+            if change_distance(v, a, junctions[k], acceleration, jerk) > length:
+                wanted = junctions[k]
+                if wanted >= v + a * abs(a) / (2.0 * jerk):
+                    junctions[k] = fastest_after(v, a, length, wanted, acceleration, jerk)
+                else:  # After a change of the override: it slows down as fast as it may.
+                    junctions[k] = slowest_after(v, a, length, acceleration, jerk)
+            v, a, s = junctions[k], 0.0, end
+        self._junctions = junctions
+        self._aim()
+
+    def _aim(self) -> None:
+        if not self._stretches:
+            return
+        end, velocity, acceleration, jerk = self._stretches[0]
+        if self._is_braking:
+            self._line.brake(acceleration, jerk)
+            return
+        junction = self._junctions[0]
+        self._line.aim_at(end, junction, max(self._override * velocity, junction), acceleration, jerk)

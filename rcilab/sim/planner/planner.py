@@ -1,0 +1,324 @@
+"""The planner of a controller that plans motions by itself, cycle by cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+from math import inf
+
+from rcilab.core.arrays import as_vector
+from rcilab.core.errors import InvalidValueError, KinematicsError
+from rcilab.core.limits import Limits
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import RobotModel
+from rcilab.motion.twist import Frame
+from rcilab.sim.planner.joint_movers import JointMover
+from rcilab.sim.planner.mover import MotionState, Mover
+from rcilab.sim.planner.path_motion import PathMotion
+from rcilab.sim.planner.planner_event import EventKind, PlannerEvent, PlannerStep, Refusal
+from rcilab.sim.planner.preparation import PlannedArm, find_outside, refusal_of
+from rcilab.sim.planner.section import PoseSolver
+from rcilab.sim.planner.target import ArcTarget, JointSpeed, JointTarget, PauseTarget, SplineTarget, Target, ToolSpeed
+
+_LONGEST_PAUSE = 1e6  # [s]
+_LARGEST_ANGLE = 1e4  # [rad] Of a circle with many turns.
+
+
+class PlannerState(Enum):
+    """What a planner does."""
+
+    IDLE = "stands, with nothing to do"
+    MOVING = "moves, or is about to"
+    PAUSED = "stands on its path until `resume`"
+
+
+class Planner:
+    """Moves an arm by targets and commands that may come at any time. Owned by the loop of the controller.
+
+    `step` is called once a cycle of 1 ms, and returns joint angles inside the limits of position, velocity,
+    acceleration and jerk. Every other method returns at once, and acts from the next step on.
+
+        planner = Planner(model, model.limits, arm.commanded.q)
+        planner.add(LineTarget(id=1, pose=pose, speed=ToolSpeed(velocity=0.1), blend=Blend(radius=0.02)))
+        q, events = planner.step()
+
+    There are three kinds of motion. A command of one kind ends the others: queued targets are discarded, and what moves
+    continues smoothly into the new motion. Only queued targets begin at standstill: they wait for it.
+
+    * Queued targets (`add`), one after the other along exact paths, with `pause`, `resume`, `end`, `clear_queue`,
+      `skip` and an override. Events say which began, ended or were refused.
+    * On-line commands: `move_joints`, `move_tool`, `set_joint_velocity`, `set_twist`. The newest one counts.
+    * Servo: `servo_joints`, `servo_tool`, `follow_joints`, `follow_tool`: the newest target, nothing planned ahead.
+
+    Args:
+        model: The arm with its tool.
+        limits: Its limits for these motions; finite, above zero.
+        q: Joint angles of the stationary arm, n plain floats, [rad].
+        slows_down: Whether a path of the tool is followed more slowly where a joint would exceed its limits. False: it
+            keeps its speed, and the checks of the arm report the joint.
+    """
+
+    def __init__(self, model: RobotModel, limits: Limits, q: Sequence[float], *, slows_down: bool = True) -> None:
+        self._arm = PlannedArm(model, limits, PoseSolver(model), slows_down)
+        self._override = 1.0
+        self._pending: list[PlannerEvent] = []
+        self.reset(q)
+
+    def reset(self, q: Sequence[float]) -> None:
+        """Discards everything without events, for an arm that something else has moved or stopped.
+
+        Args:
+            q: Joint angles of the stationary arm, n plain floats, [rad].
+        """
+        self._queue = PathMotion(self._arm, q)
+        self._queue.set_override(self._override)
+        self._mover: Mover | None = None
+        self._q = list(q)
+        self._is_paused = False
+        self._pending.clear()
+
+    def configure(self, model: RobotModel, limits: Limits) -> None:
+        """Sets another tool, load or other limits; at standstill, without targets.
+
+        Args:
+            model: The arm with its tool.
+            limits: Its limits for these motions.
+        """
+        self._arm = PlannedArm(model, limits, PoseSolver(model), self._arm.slows_down)
+        self.reset(self._q)
+
+    @property
+    def state(self) -> PlannerState:
+        """What it does."""
+        if self._mover is not None:
+            if not self._mover.is_stationary:
+                return PlannerState.MOVING
+        elif self._queue.is_paused and self._queue.is_stationary:
+            return PlannerState.PAUSED
+        return PlannerState.IDLE if self._queue.is_idle else PlannerState.MOVING
+
+    @property
+    def q(self) -> list[float]:
+        """Joint angles of the last cycle, n plain floats, [rad]."""
+        return list(self._q)
+
+    @property
+    def queued(self) -> int:
+        """Number of targets that have not ended, the running one among them."""
+        return self._queue.queued
+
+    @property
+    def current(self) -> Target | None:
+        """The target that has begun and not ended; None without one."""
+        return self._queue.current
+
+    @property
+    def progress(self) -> float:
+        """Share of the path of the current target, 0 to 1; 1 without one."""
+        return self._queue.progress
+
+    def add(self, target: Target) -> None:
+        """Appends a target to the queue.
+
+        Its path and the angles of the joints along it are computed in the next cycles, ahead of its turn. If it cannot
+        be followed, the event REFUSED says so when its turn comes, and those behind it are discarded.
+
+        Raises:
+            InvalidValueError: A value of it is not valid.
+        """
+        self._require(target)
+        self._queue.add(target)
+
+    def pause(self) -> None:
+        """Stops on the path of the queued targets, inside their speed; `resume` continues on it."""
+        self._queue.pause()
+
+    def resume(self) -> None:
+        """Continues after `pause`."""
+        self._queue.resume()
+
+    def set_override(self, part: float) -> None:
+        """Multiplies the velocities of queued targets, the running one too; above 0, up to 1.
+
+        Raises:
+            InvalidValueError: It is not.
+        """
+        if not 0.0 < part <= 1.0:
+            raise InvalidValueError("override", part, "must be above 0, up to 1")
+        self._override = part
+        self._queue.set_override(part)
+
+    def end(self) -> None:
+        """Stops on the path, inside the speed of the target, and discards all targets (slow stop)."""
+        if self._mover is not None:
+            self.stop()
+        else:
+            self._queue.end()
+
+    def stop(self) -> None:
+        """Stops every joint by itself, as fast as the limits allow, and discards all targets."""
+        mover = JointMover(self._arm.limits.joint, self._take_over(), is_synchronized=False)
+        mover.stop()
+        self._mover = mover
+
+    def clear_queue(self) -> None:
+        """Discards the targets to which the path does not lead yet; the running one continues."""
+        self._pending += self._queue.clear_queue()
+
+    def skip(self) -> None:
+        """Discards the current target of the standing arm, after `pause`; those after it begin where the arm is."""
+        self._pending += self._queue.skip()
+
+    def move_joints(self, q: Sequence[float], speed: JointSpeed) -> Refusal | None:
+        """Moves to joint angles from the running state; all joints arrive together.
+
+        Args:
+            q: n finite numbers, [rad].
+            speed: Of the joints.
+
+        Returns:
+            Why the command is refused, without effect; None: it is followed.
+
+        Raises:
+            InvalidValueError: q is not n finite numbers.
+        """
+        goal = as_vector(q, self._arm.model.n, "q", "rad").tolist()
+        _require_speed(speed, self._arm.model.n)
+        refusal = self._outside(goal)
+        if refusal is None:
+            mover = self._mover
+            if not isinstance(mover, JointMover) or not mover.is_synchronized:
+                mover = self._mover = JointMover(self._arm.limits.joint, self._take_over(), is_synchronized=True)
+            mover.set_goal(goal, speed)
+        return refusal
+
+    def move_tool(self, pose: Pose, speed: ToolSpeed) -> Refusal | None:
+        """Moves the tool to a pose from the running state, on a straight line if it stands or moves along that line.
+
+        Args:
+            pose: Pose of the tool in base.
+            speed: Of the tool.
+
+        Returns:
+            Why the command is refused, without effect; None: it is followed.
+        """
+        raise NotImplementedError
+
+    def set_joint_velocity(
+        self, dq: Sequence[float], *, speed: JointSpeed, is_synchronized: bool = True, duration: float | None = None
+    ) -> None:
+        """Moves the joints with constant velocities until the next command; at the end of its range a joint stops.
+
+        Args:
+            dq: n finite numbers, [rad/s].
+            speed: Its acceleration and jerk apply; velocities above its velocity are all reduced by one factor.
+            is_synchronized: Whether all joints reach their velocity at the same time.
+            duration: Time after which it stops, [s]; None: it does not.
+
+        Raises:
+            InvalidValueError: dq is not n finite numbers.
+        """
+        raise NotImplementedError
+
+    def set_twist(
+        self, twist: Sequence[float], *, speed: ToolSpeed, frame: Frame = "base", duration: float | None = None
+    ) -> None:
+        """Moves the tool with a constant twist until the next command.
+
+        Args:
+            twist: Velocity of the tool tip and angular velocity, linear first, [m/s, rad/s].
+            speed: Its accelerations and jerks apply; a twist above its velocities is reduced.
+            frame: Axes of the twist.
+            duration: Time after which it stops, [s]; None: it does not.
+
+        Raises:
+            InvalidValueError: The twist is not six finite numbers, or the frame is unknown.
+        """
+        raise NotImplementedError
+
+    def servo_joints(self, q: Sequence[float], *, velocity: float | None = None) -> Refusal | None:
+        """Moves every joint by itself to the newest angles, with the largest acceleration and jerk.
+
+        Args:
+            q: n finite numbers, [rad].
+            velocity: Of every joint, [rad/s]; None: the limits.
+
+        Returns:
+            Why the command is refused, without effect; None: it is followed.
+
+        Raises:
+            InvalidValueError: q is not n finite numbers.
+        """
+        raise NotImplementedError
+
+    def servo_tool(self, pose: Pose, *, velocity: float | None = None, max_step: float | None = None) -> Refusal | None:
+        """Moves every joint by itself to the angles of the newest pose, as `servo_joints`.
+
+        Args:
+            pose: Pose of the tool in base.
+            velocity: Of every joint, [rad/s]; None: the limits.
+            max_step: Largest distance from the last commanded pose, [m]; None: any.
+
+        Returns:
+            Why the command is refused, without effect; None: it is followed.
+        """
+        raise NotImplementedError
+
+    def step(self) -> PlannerStep:
+        """Advances one cycle."""
+        events, self._pending = self._pending, []
+        try:
+            if self._mover is not None:
+                self._q = self._mover.step()
+                if self._queue.queued and self._mover.is_stationary:
+                    self._mover = None
+                    self._queue.begin_at(self._q)
+            else:
+                self._q, more = self._queue.step()
+                events += more
+        except KinematicsError as error:  # Between two samples that were reachable.
+            current = self._queue.current
+            if current is not None:
+                events.append(PlannerEvent(current.id, EventKind.REFUSED, refusal_of(error, self.progress)))
+            self.stop()
+        return PlannerStep(self._q, tuple(events))
+
+    def _take_over(self) -> MotionState:
+        """Returns the running state, for a motion that continues from it; discards all targets."""
+        mover = self._mover
+        state = self._queue.state if mover is None else mover.state
+        self._pending += self._queue.discard()
+        return state
+
+    def _outside(self, q: Sequence[float]) -> Refusal | None:
+        limits = self._arm.limits.joint
+        return find_outside(q, list(zip(limits.lower.tolist(), limits.upper.tolist(), strict=True)), 1.0)
+
+    def _require(self, target: Target) -> None:
+        n = self._arm.model.n
+        if isinstance(target, JointTarget):
+            if (target.q is None) == (target.pose is None):
+                raise InvalidValueError("joint target", target.id, "needs joint angles or a pose, and not both")
+            if target.q is not None:
+                as_vector(target.q, n, "q", "rad")
+        elif isinstance(target, PauseTarget):
+            if not 0.0 <= target.seconds < _LONGEST_PAUSE:
+                problem = f"must be 0 or more, below {_LONGEST_PAUSE:g} [s]"
+                raise InvalidValueError("pause", target.seconds, problem)
+        elif isinstance(target, SplineTarget):
+            if not target.poses:
+                raise InvalidValueError("poses", (), "must be at least one")
+        elif isinstance(target, ArcTarget) and target.angle is not None and not 0.0 < target.angle < _LARGEST_ANGLE:
+            raise InvalidValueError("angle", target.angle, f"must be above 0, below {_LARGEST_ANGLE:g} [rad]")
+        if not isinstance(target, PauseTarget):
+            _require_speed(target.speed, n)
+
+
+def _require_speed(speed: JointSpeed | ToolSpeed, n: int) -> None:
+    for name in speed.__slots__:
+        value: float | tuple[float, ...] | None = getattr(speed, name)
+        numbers = value if isinstance(value, tuple) else () if value is None else (value,)
+        if isinstance(value, tuple) and len(value) != n:
+            raise InvalidValueError(name, value, f"must be one number, or {n}")
+        if not all(0.0 < x < inf for x in numbers):
+            raise InvalidValueError(name, value, "must be above zero and finite")
