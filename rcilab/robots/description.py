@@ -37,6 +37,8 @@ class CraigRow:
     """[rad]."""
     d: float
     """[m]."""
+    theta_offset: float = 0.0
+    """Added to the joint angle, [rad]."""
 
 
 def rows_from_craig(table: Sequence[CraigRow]) -> tuple[DhRow, ...]:
@@ -55,8 +57,10 @@ def rows_from_craig(table: Sequence[CraigRow]) -> tuple[DhRow, ...]:
     first, *_, flange = table
     if first.a or first.alpha or flange.a or flange.alpha:
         raise ValueError("a Craig table needs joint 1 on the base z axis and the flange on the last joint's axis")
-    rows = [DhRow(a=after.a, alpha=after.alpha, d=row.d) for row, after in pairwise(table)]
-    rows[-1] = DhRow(a=0.0, alpha=0.0, d=table[-2].d + flange.d)
+    rows = [
+        DhRow(a=after.a, alpha=after.alpha, d=row.d, theta_offset=row.theta_offset) for row, after in pairwise(table)
+    ]
+    rows[-1] = DhRow(a=0.0, alpha=0.0, d=table[-2].d + flange.d, theta_offset=table[-2].theta_offset)
     return tuple(rows)
 
 
@@ -77,7 +81,7 @@ class Link:
     """A rigid body of the arm.
 
     Its frame is parallel to the base frame when all joint angles are zero, and its origin is then in the base's xz
-    plane.
+    plane, unless the arm has an offset across it.
     """
 
     mass: float
@@ -92,11 +96,13 @@ class Link:
     """Source of mass, centre and tensor."""
     origin_ahead: float = 0.0
     """Distance of that origin from the base z axis along base x when all joint angles are zero, [m]."""
+    origin_aside: float = 0.0
+    """The same along base y, [m]."""
 
     @property
     def origin(self) -> Vector3:
         """Origin of the link's frame in base when all joint angles are zero, shape (3,), [m]."""
-        return readonly_copy([self.origin_ahead, 0.0, self.origin_height])
+        return readonly_copy([self.origin_ahead, self.origin_aside, self.origin_height])
 
     def __repr__(self) -> str:
         centre = " ".join(f"{x:.4g}" for x in self.center_of_mass.tolist())

@@ -42,8 +42,17 @@ def foot_plate(radius: float, segments: int) -> Mesh:
     return revolve(edge, segments=segments)
 
 
-def flange_plate(up: float, segments: int) -> Mesh:
-    """Returns the disc of the flange, in the last link's frame; `up` is the direction of its face along z, +1 or -1."""
+def flange_plate(rotation: Array, segments: int) -> Mesh:
+    """Returns the disc of the flange, in the last link's frame; its face looks along z of the flange.
+
+    Args:
+        rotation: Of the flange in the last link's frame, shape (3, 3).
+        segments: Facets around it.
+    """
+    up = rotation[2, 2]
     r, bevel = _FLANGE_RADIUS, 0.4 * _FLANGE_HEIGHT  # Bevelled, so that the ball end of the link's capsule covers it.
     edge = [(0.0, -_FLANGE_HEIGHT), (r, -_FLANGE_HEIGHT), (r, -bevel), (0.55 * r, 0.0), (0.0, 0.0)]
-    return revolve(edge if up > 0.0 else [(radius, -h) for radius, h in reversed(edge)], segments=segments)
+    if up < 0.0:
+        edge = [(radius, -height) for radius, height in reversed(edge)]
+    plate = revolve(edge, segments=segments)
+    return plate if up else Mesh(plate.vertices @ rotation.T, plate.faces)

@@ -140,8 +140,7 @@ def _rod_arm(description: RobotDescription, rods: tuple[tuple[Rod, ...], ...], f
         for of_link in rods
     )
     foot = Part(foot_plate(1.3 * rods[0][-1].radius, fine.segments), "cap")
-    up = float(upright_flange(description).rotation[2, 2])
-    flange = Part(flange_plate(up, fine.segments), "dark")
+    flange = Part(flange_plate(upright_flange(description).rotation, fine.segments), "dark")
     base = LinkShape((foot, *base.parts), base.capsules)
     links[-1] = LinkShape((flange, *links[-1].parts), links[-1].capsules)
     return ArmShape(base=base, links=tuple(links))

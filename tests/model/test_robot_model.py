@@ -29,8 +29,12 @@ def test_every_limit_has_a_source(name):
             # The arm's own bounds beside soft ones have their sources already; not every arm has bounds near the ends.
             if bound != "own" and getattr(values, bound) is not None:
                 assert limits.source(f"{group}.{bound}")
-    place = {"rokae": "RCI user manual V1.3.1, 4.4", "franka": "Franka's page"}[model.description.maker]
-    assert place in limits.source("joint.velocity")
+    places = {
+        "rokae": "RCI user manual V1.3.1, 4.4",
+        "franka": "Franka's page",
+        "realman": "the maker's client library",
+    }
+    assert places[model.description.maker] in limits.source("joint.velocity")
 
 
 def test_an_unknown_limit_lists_the_known_ones():

@@ -35,7 +35,11 @@ def test_flange_and_tool_are_where_our_kinematics_put_them(name: str) -> None:
 
 @arms
 def test_gravity_and_inertia_are_those_of_the_model_with_and_without_a_load(name: str) -> None:
-    load = Payload(mass=2.5, center_of_mass=np.array([0.01, -0.02, 0.08]), inertia=np.diag([0.01, 0.02, 0.015]))
+    load = Payload(
+        mass=min(2.5, load_model(name).description.rated_payload),
+        center_of_mass=np.array([0.01, -0.02, 0.08]),
+        inertia=np.diag([0.01, 0.02, 0.015]),
+    )
     for model in (load_model(name), load_model(name, load=load)):
         arm = mujoco.MjModel.from_xml_string(build_mjcf(model.description, load=model.load))
         arm.opt.gravity[2] = -9.81

@@ -57,7 +57,7 @@ class NumericSolver:
             raise ModelError(f"{description.name}: no inverse for {n} joints; the numeric solver supports up to 7")
         self._held = _HELD if n == 7 else None
         self.redundancy = NO_REDUNDANCY if self._held is None else Redundancy("joint", _HELD + 1)
-        half = 0.5 * (dh[0].a + sum(hypot(row.a, row.d) for row in dh[1:-1]) + dh[-1].a)
+        half = 0.5 * (abs(dh[0].a) + sum(hypot(row.a, row.d) for row in dh[1:-1]) + abs(dh[-1].a))
         self.envelope = Envelope(shoulder=dh[0].d, upper=half, fore=half, hand=dh[-1].d)
         self._arm = NumericArm(build_chain(dh), self._held, joint.lower, joint.upper, 2.0 * half)
         self._free = free_joints(self._arm.chain, self._held)

@@ -46,8 +46,8 @@ def follow_branch(
         have no meaning.
     """
     tracker = _Tracker()
-    offsets = np.array(arm.offsets)
-    guess = (start - offsets).tolist()
+    offsets, signs = np.array(arm.offsets), np.array(arm.signs)
+    guess = (signs * (start - offsets)).tolist()
     # Contiguous columns, because every step below uses them.
     r = [[np.ascontiguousarray(rotations[:, i, j]) for j in range(3)] for i in range(3)]
     x, y, z = (positions[:, i] - arm.hand * r[i][2] for i in range(3))
@@ -76,7 +76,8 @@ def follow_branch(
     sine, cosine = (mx * r[0][j] + my * r[1][j] + mz * r[2][j] for j in (0, 1))
     third = _continued(np.arctan2(sine, cosine), guess[-1])
     # Each joint contiguous in memory, because later computations run along the path.
-    return (np.stack((*head, first, np.arctan2(tilt, zz), third)) + offsets[:, np.newaxis]).T, tracker.loss
+    upright = np.stack((*head, first, np.arctan2(tilt, zz), third))
+    return (signs[:, np.newaxis] * upright + offsets[:, np.newaxis]).T, tracker.loss
 
 
 def _seven(

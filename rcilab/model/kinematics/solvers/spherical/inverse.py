@@ -26,7 +26,16 @@ _AXIS_LOST = 1e-12  # sin of an angle below which the axes before and after it a
 _STRETCHED = 1e-15  # 1 - cos of the elbow angle that rounding alone can cause; it moves the wrist by less than 1e-15 m.
 _QUARTER = pi / 2
 _SEVEN = (-_QUARTER, _QUARTER, -_QUARTER, _QUARTER, -_QUARTER, _QUARTER, 0.0)
-_SIX = (-_QUARTER, 0.0, _QUARTER, -_QUARTER, _QUARTER, 0.0)
+_SIXES: tuple[tuple[Angles, Angles, Angles], ...] = (
+    ((-_QUARTER, 0.0, _QUARTER, -_QUARTER, _QUARTER, 0.0), (0.0, -_QUARTER, _QUARTER, 0.0, 0.0, 0.0), (1.0,) * 6),
+    (
+        (_QUARTER, 0.0, _QUARTER, -_QUARTER, _QUARTER, 0.0),
+        (0.0, _QUARTER, _QUARTER, 0.0, 0.0, -pi),
+        (1.0, -1.0, -1.0, 1.0, -1.0, 1.0),
+    ),
+)
+"""Tables of 6 axes: turns of the rows, theta of the upright arm, signs of the joints. In the second one the axes of
+joints 2, 3 and 5 point the other way."""
 ALL_FLIPS: tuple[Angles, ...] = tuple(product((0.0, pi), repeat=3))
 """Every branch of a 7-axis arm; see `inverse_seven`."""
 
@@ -46,6 +55,13 @@ class ArmGeometry:
     """Wrist centre to flange: d7 of 7 axes, d6 of 6."""
     offsets: Angles
     """Joint angle minus upright angle, [rad]: zero unless the table's theta offsets differ from the upright ones."""
+    signs: Angles
+    """+1, or -1 for a joint that turns the other way about y; then the angle is the offset minus the upright angle."""
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether joint angles are the upright ones."""
+        return not any(self.offsets) and min(self.signs) > 0.0
 
 
 def build_geometry(description: RobotDescription) -> ArmGeometry:
@@ -57,11 +73,13 @@ def build_geometry(description: RobotDescription) -> ArmGeometry:
     dh = description.dh
     if len(dh) == 7 and _has_shape(dh, _SEVEN, d=(0, 2, 4, 6), a=()):
         offsets = tuple(-row.theta_offset for row in dh)
-        return ArmGeometry(n=7, shoulder=dh[0].d, upper=dh[2].d, fore=dh[4].d, hand=dh[6].d, offsets=offsets)
-    if len(dh) == 6 and _has_shape(dh, _SIX, d=(0, 3, 5), a=(1,)):
-        upright = (0.0, -_QUARTER, _QUARTER, 0.0, 0.0, 0.0)
-        offsets = tuple(zero - row.theta_offset for row, zero in zip(dh, upright, strict=True))
-        return ArmGeometry(n=6, shoulder=dh[0].d, upper=dh[1].a, fore=dh[3].d, hand=dh[5].d, offsets=offsets)
+        lengths = {"shoulder": dh[0].d, "upper": dh[2].d, "fore": dh[4].d, "hand": dh[6].d}
+        return ArmGeometry(n=7, **lengths, offsets=offsets, signs=(1.0,) * 7)
+    for alphas, upright, signs in _SIXES:
+        if len(dh) == 6 and _has_shape(dh, alphas, d=(0, 3, 5), a=(1,)):
+            offsets = tuple(zero - row.theta_offset for row, zero in zip(dh, upright, strict=True))
+            lengths = {"shoulder": dh[0].d, "upper": dh[1].a, "fore": dh[3].d, "hand": dh[5].d}
+            return ArmGeometry(n=6, **lengths, offsets=offsets, signs=signs)
     raise ModelError(
         f"{description.name}: no closed-form inverse for this Denavit-Hartenberg table; it needs a 7-axis arm "
         "without offsets or a 6-axis arm with a spherical wrist"
@@ -127,7 +145,7 @@ def inverse_seven(
     for flip_2, flip_4, flip_6 in flips:
         i, j, k = flip_2 > 0.0, flip_4 > 0.0, flip_6 > 0.0
         branches.append((twins_1[i], twins_2[i], twins_3[i ^ j], twins_4[j], twins_5[j ^ k], twins_6[k], twins_7[k]))
-    return branches if not any(arm.offsets) else [_shift(q, arm.offsets) for q in branches]
+    return branches if arm.is_upright else [_from_upright(arm, q) for q in branches]
 
 
 def inverse_six(arm: ArmGeometry, T_base_flange: Pose, near: Sequence[float] | None) -> list[Angles]:
@@ -142,7 +160,7 @@ def inverse_six(arm: ArmGeometry, T_base_flange: Pose, near: Sequence[float] | N
         UnreachableError: The wrist centre is out of reach.
     """
     r, x, y, z, _, c3 = wrist_centre(arm, T_base_flange)
-    guess = _shift(near, tuple(-offset for offset in arm.offsets)) if near else (0.0,) * 6
+    guess = upright_angles(arm, near) if near else (0.0,) * 6
     s3 = sqrt(max(0.0, 1.0 - c3 * c3))
     horizontal = hypot(x, y)
     azimuth = atan2(y, x) if horizontal > _AXIS_LOST else guess[0]
@@ -163,7 +181,7 @@ def inverse_six(arm: ArmGeometry, T_base_flange: Pose, near: Sequence[float] | N
             head = (_wrap(q1), _wrap(q2), q3)
             branches.append((*head, _wrap(q4), q5, _wrap(q6)))
             branches.append((*head, _wrap(q4 + pi), -q5, _wrap(q6 + pi)))
-    return branches if not any(arm.offsets) else [_shift(q, arm.offsets) for q in branches]
+    return branches if arm.is_upright else [_from_upright(arm, q) for q in branches]
 
 
 def wrist_centre(arm: ArmGeometry, T: Pose) -> tuple[Rotation9, float, float, float, float, float]:
@@ -232,8 +250,13 @@ def _wrap(angle: float) -> float:
     return angle
 
 
-def _shift(q: Sequence[float], by: Angles) -> Angles:
-    return tuple(_wrap(angle + offset) for angle, offset in zip(q, by, strict=True))
+def upright_angles(arm: ArmGeometry, q: Sequence[float]) -> Angles:
+    """Returns the upright angles of joint angles, with their full turns, [rad]."""
+    return tuple(sign * (angle - offset) for angle, offset, sign in zip(q, arm.offsets, arm.signs, strict=True))
+
+
+def _from_upright(arm: ArmGeometry, q: Angles) -> Angles:
+    return tuple(_wrap(sign * angle + offset) for angle, offset, sign in zip(q, arm.offsets, arm.signs, strict=True))
 
 
 def _has_shape(dh: Sequence[DhRow], alphas: Angles, d: tuple[int, ...], a: tuple[int, ...]) -> bool:

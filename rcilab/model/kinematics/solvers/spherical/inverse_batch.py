@@ -162,6 +162,6 @@ def _wrapped(q: Array) -> Array:
 
 
 def _shift(found: Array, arm: ArmGeometry) -> None:
-    for joint, offset in enumerate(arm.offsets):
-        if offset:
-            found[joint] = _wrapped(found[joint] + offset)
+    for joint, (offset, sign) in enumerate(zip(arm.offsets, arm.signs, strict=True)):
+        if offset or sign < 0.0:
+            found[joint] = _wrapped(sign * found[joint] + offset)

@@ -8,7 +8,7 @@ from math import cos, degrees, hypot, sin, sqrt
 import numpy as np
 
 from rcilab.core.arrays import Array, JointPath
-from rcilab.model.kinematics.solvers.spherical.inverse import ArmGeometry
+from rcilab.model.kinematics.solvers.spherical.inverse import ArmGeometry, upright_angles
 
 SINGULAR = 0.02
 """Sine of an angle, or share of the reach, below which an arm counts as singular. Tuning value: about a degree."""
@@ -25,9 +25,7 @@ def find_singularity(arm: ArmGeometry, q: Sequence[float]) -> str | None:
         arm: From `build_geometry`.
         q: Joint angles, n plain floats, [rad].
     """
-    upright = q
-    if any(arm.offsets):
-        upright = [angle - offset for angle, offset in zip(q, arm.offsets, strict=True)]
+    upright = q if arm.is_upright else upright_angles(arm, q)
     if arm.n == 7:
         return _singular_seven(arm, upright)
     return _singular_six(arm, upright)
@@ -42,7 +40,7 @@ def singularity_path(arm: ArmGeometry, q: JointPath) -> Array:
         arm: From `build_geometry`.
         q: Joint angles, shape (N, n), [rad].
     """
-    upright = q - np.array(arm.offsets)
+    upright = np.array(arm.signs) * (q - np.array(arm.offsets))
     away = _away_seven(arm, upright) if arm.n == 7 else _away_six(arm, upright)
     with np.errstate(divide="ignore"):
         return SINGULAR / away
