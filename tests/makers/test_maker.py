@@ -185,6 +185,8 @@ def test_loading_a_model_by_name_loads_neither_wire_nor_engine_nor_client_librar
 @MAKERS
 def test_a_maker_is_patient_if_its_virtual_controller_is(maker: Maker):
     name = next(iter(maker.robots))
+    if not maker.capabilities.simulates:
+        pytest.skip("it has no virtual controller")
     config = ControllerConfig(model=name, port=0, world_port=None)
     model = load_model(name)
     server = maker.build_server(VirtualArm(model, build_plant("ideal", model)), config)
