@@ -97,7 +97,7 @@ def _build_parser(commands: Sequence[str] = COMMANDS) -> argparse.ArgumentParser
 
     parser = argparse.ArgumentParser(
         prog="rcilab",
-        description="A lab for ROKAE xMate arms. Without a command it opens the workbench in the browser.",
+        description="A lab for robot arms. Without a command it opens the workbench in the browser.",
     )
     parser.add_argument("--version", action="version", version=f"rcilab {__version__}")
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True)

@@ -26,9 +26,10 @@ class BoundsTable:
             self._lower += lower.tolist()
             self._upper += upper.tolist()
 
-    def set_bounds(self, index: int, lower: float, upper: float) -> None:
-        """Changes the bounds of the value at an index of those passed to `evaluate`."""
-        self._lower[index], self._upper[index] = lower, upper
+    def set_bounds(self, first: int, lower: Sequence[float], upper: Sequence[float]) -> None:
+        """Changes the bounds of values from an index on of those passed to `evaluate`."""
+        end = first + len(lower)
+        self._lower[first:end], self._upper[first:end] = lower, upper
 
     def evaluate(self, values: Sequence[float]) -> list[LimitViolation]:
         """Returns the violations; every value must be strictly between its bounds, which NaN never is.

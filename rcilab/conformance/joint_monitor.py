@@ -14,6 +14,8 @@ from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import SMALLEST_END_VELOCITY, JointLimits
 
+_ROUNDING = 1e-9  # Of the distance from the ends beyond which a velocity bound is constant.
+
 
 class JointMonitor:
     """Checks one commanded position per cycle by the same rows as `check`, with the same arithmetic.
@@ -101,16 +103,22 @@ class _EndBounds:
         """First index of each affected condition in the table of bounds."""
         self._joints: list[tuple[float, ...]] = []
         if ends is not None:
-            columns = (own.lower, own.upper, limits.velocity, ends.offset, 2.0 * ends.deceleration)
+            velocity, offset, twice = limits.velocity, ends.offset, 2.0 * ends.deceleration
+            near = (1.0 + _ROUNDING) * (velocity + offset) ** 2 / twice
+            columns = own.lower, own.upper, velocity, offset, twice, own.lower + near, own.upper - near
             self._joints = list(zip(*(column.tolist() for column in columns), strict=True))
 
     def apply(self, table: BoundsTable, q: Sequence[float]) -> None:
         """Sets the bounds for a command after joint angles, n numbers, [rad]."""
+        lowest: list[float] = []
+        highest: list[float] = []
+        for angle, (low, high, velocity, offset, twice, near_low, near_high) in zip(q, self._joints, strict=True):
+            lowest.append(-velocity if angle > near_low else -_end_velocity(twice * (angle - low), offset, velocity))
+            highest.append(velocity if angle < near_high else _end_velocity(twice * (high - angle), offset, velocity))
         for first in self.rows:
-            for i, (angle, (low, high, velocity, offset, twice)) in enumerate(zip(q, self._joints, strict=True), first):
-                down, up = twice * (angle - low), twice * (high - angle)
-                down = sqrt(down) - offset if down > 0.0 else 0.0
-                up = sqrt(up) - offset if up > 0.0 else 0.0
-                table.set_bounds(
-                    i, -min(max(down, SMALLEST_END_VELOCITY), velocity), min(max(up, SMALLEST_END_VELOCITY), velocity)
-                )
+            table.set_bounds(first, lowest, highest)
+
+
+def _end_velocity(square: float, offset: float, velocity: float) -> float:
+    speed = sqrt(square) - offset if square > 0.0 else 0.0
+    return min(max(speed, SMALLEST_END_VELOCITY), velocity)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from rcilab.conformance.bounds_table import BoundsTable
 from rcilab.conformance.common_conditions import ACCELERATION_CUTOFF, MEASURED_CONDITIONS
 from rcilab.conformance.divided_differences import tool_norms
@@ -25,7 +27,7 @@ class MeasuredMonitor:
 
     Owned by the thread that runs the cycle. The bounds are the commanded ones with the allowances of
     `common_conditions`. Accelerations are low-pass filtered differences of the measured velocities; they are zero in
-    the first step after a `reset`.
+    the first step after a `reset`, and always if none is bounded.
 
     Attributes:
         acceleration: Filtered joint accelerations, n floats, [rad/s^2].
@@ -46,6 +48,9 @@ class MeasuredMonitor:
         self._n = len(limits.joint.velocity)
         self._box = box if isinstance(box, EntryBox) else active_box(box)
         self._rows = BoundsTable(rows, limits)
+        self._has_accelerations = bool(
+            math.isfinite(limits.cartesian.translation_acceleration) or np.isfinite(limits.joint.acceleration).any()
+        )
         self.reset([0.0] * self._n)
 
     @property
@@ -89,8 +94,9 @@ class MeasuredMonitor:
                 motions, which do not bound it (manual 4.1).
             psi: Arm angle, [rad]; None is not checked.
         """
-        self.acceleration = _filter_difference(self.acceleration, dq, self._dq)
-        self.tool_acceleration = _filter_difference(self.tool_acceleration, twist, self._twist)
+        if self._has_accelerations:
+            self.acceleration = _filter_difference(self.acceleration, dq, self._dq)
+            self.tool_acceleration = _filter_difference(self.tool_acceleration, twist, self._twist)
         speed = 0.0
         if psi is not None and self._psi is not None:
             speed = math.remainder(psi - self._psi, 2.0 * math.pi) / CYCLE_TIME if math.isfinite(psi) else math.nan
@@ -98,8 +104,9 @@ class MeasuredMonitor:
         self._twist = None if twist is None else list(twist)
         excess = -1.0 if self._box is None else self._box.excess(position)
         velocity = (0.0, 0.0) if twist is None else tool_norms(twist)
-        acceleration = tool_norms(self.tool_acceleration)
-        self._values = [*q, excess, speed, *dq, *velocity, *self.acceleration, *acceleration]
+        self._values = [*q, excess, speed, *dq, *velocity]
+        if self._has_accelerations:
+            self._values += [*self.acceleration, *tool_norms(self.tool_acceleration)]
         return self._rows.evaluate(self._values)
 
     def violations(self) -> list[LimitViolation]:

@@ -138,12 +138,16 @@ def _pack_run(run: Run, tracking: Tracking, scales: dict[str, PlotScale], packed
     limits = None
     if run.model is not None:
         joint = run.model.limits.joint
-        bounds = {
+        bounds: dict[str, tuple[NDArray[Any], NDArray[Any]]] = {
             "q": (joint.lower, joint.upper),
             "dq": (-joint.velocity, joint.velocity),
             "tau": (-joint.torque, joint.torque),
         }
         limits = {name: [(factor[name] * side).tolist() for side in pair] for name, pair in bounds.items()}
+        if joint.near_ends is not None:
+            lowest, highest = joint.velocity_bounds(run.q)
+            packs["dq_lowest"] = packed.add(factor["dq"] * lowest.T)
+            packs["dq_highest"] = packed.add(factor["dq"] * highest.T)
     return {"n": run.q.shape[1], "arrays": packs, "limits": limits}
 
 

@@ -457,5 +457,5 @@ class VirtualArm:
         commanded, tool = self.commanded, self.tool_c
         if commanded.version != self._tool_version or not tool.is_stationary:
             q, dq, _ = commanded.arrays
-            tool.update(commanded.q, self.model.rigid_body.tool_motion(q, dq))
+            tool.update(commanded.q, self.model.rigid_body.tool_terms(q, dq))
             self._tool_version = commanded.version

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import base64
 import csv
+import gzip
 import io
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rcilab.i18n.units import Units
+from rcilab.model.robot_model import load_model
 from rcilab.recording.columns import run_facts
-from tests.recording.runs import OFFSET, SETUP, export_run, some_ideal_run, some_run, some_stopped_run
+from rcilab.recording.run import build_run
+from tests.recording.runs import OFFSET, SETUP, export_run, some_cycles, some_ideal_run, some_run, some_stopped_run
 
 RUN = some_run()
 
@@ -110,6 +115,22 @@ def test_the_page_is_drawn_in_the_units_of_the_workbench_and_never_finer_than_it
     assert usual["charts"][3]["least"] == pytest.approx(0.02)
     assert usual["path"]["worst_text"] == "0.02 mm"  # Not 1.0e-9 mm.
     assert content_of(export_run(RUN, ".html"))["path"]["worst_text"] == "0.63 mm"
+
+
+def test_the_page_of_an_arm_whose_velocity_bounds_depend_on_its_angles_has_them_as_curves():
+    fr3 = load_model("FR3")
+    page = export_run(build_run(some_cycles(), plan=None, model=fr3, setup=SETUP), ".html")
+    arrays = content_of(page)["run"]["arrays"]
+    packed = gzip.decompress(base64.b64decode(re.search(rb'id="arrays"[^>]*>([^<]+)<', page)[1]))
+    lowest, highest = (
+        np.frombuffer(packed, "<f4", arrays[name]["count"], arrays[name]["at"]).reshape(7, -1)
+        for name in ("dq_lowest", "dq_highest")
+    )
+    at_angles = fr3.limits.joint.velocity_bounds(RUN.q)
+    assert np.allclose(np.radians(lowest.T), at_angles[0], atol=1e-5)
+    assert np.allclose(np.radians(highest.T), at_angles[1], atol=1e-5)
+    assert np.ptp(highest[1]) > 10.0
+    assert "dq_lowest" not in content_of(export_run(RUN, ".html"))["run"]["arrays"]
 
 
 def test_the_page_asks_for_nothing_from_elsewhere_and_speaks_both_languages():

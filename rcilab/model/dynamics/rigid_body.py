@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -99,6 +100,10 @@ class ToolTerms:
             model, data, _, q, _ = self._args
             found = self._mass_inverse = pin.computeMinverse(model, data, q).copy()
         return found
+
+    def is_of(self, q: Sequence[float]) -> bool:
+        """Returns whether the terms are those of joint angles, n plain floats, [rad]."""
+        return self._args[3].tolist() == q
 
     def acceleration(self, ddq: JointVector) -> Array:
         """Returns the tool's acceleration J ddq + dJ/dt dq, base axes, linear first, shape (6,), [m/s^2, rad/s^2].
@@ -265,6 +270,11 @@ class RigidBody:
     def tool_motion(self, q: JointVector, dq: JointVector) -> ToolTerms:
         """Returns the tool's pose, twist and Jacobian in one state; see `ToolTerms` for the arguments."""
         return ToolTerms(self._weightless, self._data, self._tool, q, dq)
+
+    @property
+    def last_terms(self) -> ToolTerms | None:
+        """The last result of `tool_terms`."""
+        return self._tool_terms
 
     def tool_terms(self, q: JointVector, dq: JointVector) -> ToolTerms:
         """Returns the `tool_motion` of the current state, shared by all control laws of a cycle.

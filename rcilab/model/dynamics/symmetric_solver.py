@@ -9,6 +9,7 @@ NumPy's general solver, whose checks dominate, and for the modes of seven joints
 
 from __future__ import annotations
 
+from math import prod
 from typing import NamedTuple
 
 import eigenpy  # pyright: ignore[reportMissingImports]  # Installed through a .pth file.
@@ -38,6 +39,11 @@ class SymmetricSolver:
             b: Shape (size,) or (size, columns).
         """
         return self._decomposition.compute(A).solve(b)
+
+    @property
+    def determinant(self) -> float:
+        """Determinant of the last matrix; undefined if it was not positive-definite."""
+        return prod(self._decomposition.matrixLLT().diagonal().tolist()) ** 2
 
     @property
     def has_solved(self) -> bool:

@@ -60,8 +60,11 @@ class Plots {
   }
 
   drawRow(g, row, top, height, edges) {
-    const chosen = this.curves(row), limit = this.joint && row.limits ? [row.limits[0][this.joint - 1], row.limits[1][this.joint - 1]] : null;
-    const [a, b] = [edges[0], edges[this.columns]];
+    const chosen = this.curves(row), [a, b] = [edges[0], edges[this.columns]];
+    const sides = this.joint && row.limits ? row.limits.map((side) => side[this.joint - 1]) : null;  // Numbers, or curves.
+    const isCurve = Boolean(sides) && typeof sides[0] !== "number";
+    const most = (side, pick, from) => side.subarray(a, b).reduce((x, v) => pick(x, v), from);
+    const limit = isCurve ? [most(sides[0], Math.min, Infinity), most(sides[1], Math.max, -Infinity)] : sides;
     let low = Infinity, high = -Infinity;
     for (const set of [row.actual, row.plan || []]) for (const j of chosen) if (set[j]) for (let i = a; i < b; i++) {
       const v = set[j][i];
@@ -77,8 +80,14 @@ class Plots {
     g.lineWidth = 1; g.strokeStyle = "#e6ebf2";
     for (const v of ticks) line(g, LEFT, y(v), LEFT + this.columns, y(v));
     if (limit) {
-      g.fillStyle = "rgba(209,57,43,.08)"; g.fillRect(LEFT, top, this.columns, y(limit[1]) - top); g.fillRect(LEFT, y(limit[0]), this.columns, top + height - y(limit[0]));
-      g.strokeStyle = "#d1392b"; g.setLineDash([5, 4]); limit.forEach((v) => line(g, LEFT, y(v), LEFT + this.columns, y(v))); g.setLineDash([]);
+      g.fillStyle = "rgba(209,57,43,.08)"; g.strokeStyle = "#d1392b";
+      for (let c = 0; c < (isCurve ? this.columns : 1); c++) {
+        const [low, high] = isCurve ? sides.map((side) => side[edges[c]]) : sides, wide = isCurve ? 1 : this.columns;
+        g.fillRect(LEFT + c, top, wide, y(high) - top); g.fillRect(LEFT + c, y(low), wide, top + height - y(low));
+      }
+      g.setLineDash([5, 4]);
+      for (const side of sides) if (isCurve) this.curve(g, side, edges, y, "#d1392b", 1); else line(g, LEFT, y(side), LEFT + this.columns, y(side));
+      g.setLineDash([]);
     }
     g.fillStyle = "rgba(214,48,38,.30)";
     for (let c = 0; c < this.columns; c++) for (let i = edges[c]; i < edges[c + 1]; i++) if (this.faults[i]) { g.fillRect(LEFT + c - 1, top, 3, height); break; }

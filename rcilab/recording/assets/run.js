@@ -13,11 +13,11 @@
   };
 
   const t = array(run.arrays.t), signals = {};
-  for (const name of ["q", "dq", "tau", "error", "q_plan", "dq_plan"]) if (run.arrays[name]) signals[name] = pieces(run.arrays[name], run.n);
+  for (const name of ["q", "dq", "tau", "error", "q_plan", "dq_plan", "dq_lowest", "dq_highest"]) if (run.arrays[name]) signals[name] = pieces(run.arrays[name], run.n);
   const limits = run.limits || {}, tool = array(run.arrays.tool);
   signals.tool = [tool];
   const charts = kinds.filter(({ name }) => name !== "tool" || tool.some((x) => x === x)).map((kind) => ({
-    ...kind, actual: signals[kind.name], plan: signals[`${kind.name}_plan`], limits: limits[kind.name],
+    ...kind, actual: signals[kind.name], plan: signals[`${kind.name}_plan`], limits: signals[`${kind.name}_lowest`] ? [signals[`${kind.name}_lowest`], signals[`${kind.name}_highest`]] : limits[kind.name],
     error: kind.name === "error" || kind.name === "tool", positive: kind.name === "tool",
   }));
   const perRadian = kinds.find(({ name }) => name === "q").factor;

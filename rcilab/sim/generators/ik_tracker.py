@@ -73,13 +73,16 @@ class IkTracker:
             UnreachableError: The pose is out of reach, or too far from the last one.
             SingularError: The tool would lose a direction of motion.
         """
-        body, q = self._body, np.array(near)
-        jacobian, error = self._differential(q, T_base_tool)
+        body, q, here = self._body, np.array(near), self._body.last_terms
+        if here is None or not here.is_of(near):
+            here = body.tool_motion(q, self._still)
+        jacobian, error = here.jacobian, _error(here.pose, T_base_tool)
         square = jacobian.dot(jacobian.T)
-        if np.linalg.det(square) < _SMALLEST:
-            raise SingularError("the tool cannot move in every direction there")
-        for _ in range(_MOST_STEPS):
-            q = q + jacobian.T.dot(body.tool_solver.solve(square, np.array(error)))
+        for number in range(_MOST_STEPS):
+            step = jacobian.T.dot(body.tool_solver.solve(square, np.array(error)))
+            if number == 0 and not (body.tool_solver.has_solved and body.tool_solver.determinant >= _SMALLEST):
+                raise SingularError("the tool cannot move in every direction there")
+            q = q + step
             size = max(map(abs, error))
             if size < _CONVERGING:
                 return q.tolist()

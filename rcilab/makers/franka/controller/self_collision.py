@@ -6,6 +6,8 @@ program that a real arm would carry out is stopped. An arm whose links touch may
 
 from __future__ import annotations
 
+import numpy as np
+
 from rcilab.core.arrays import JointVector
 from rcilab.i18n.translator import Remark
 from rcilab.model.kinematics.collision import ClearanceQuery
@@ -15,15 +17,21 @@ TOLERANCE = 1e-4  # [m] By which links that touch at the start may approach: ser
 
 
 class SelfCollisionWatch:
-    """Observes the distance between the links. Owned by the controller. A step takes about 5 us.
+    """Observes the distance between the links. Owned by the controller.
+
+    The distance is computed (5 us) where the joints have moved far enough since the last time to close it.
 
     Args:
         model: The arm.
     """
 
     def __init__(self, model: RobotModel) -> None:
-        self._query = ClearanceQuery(model.collision_geometry())
+        geometry = model.collision_geometry()
+        self._query = ClearanceQuery(geometry)
+        self._levers = geometry.levers
         self._smallest = 0.0
+        self._q = model.home
+        self._reserve = 0.0
 
     def begin(self, q: JointVector) -> None:
         """Begins to observe a motion.
@@ -32,6 +40,7 @@ class SelfCollisionWatch:
             q: Measured joint angles, shape (7,), [rad].
         """
         self._smallest = min(0.0, self._query.links(q)[0] - TOLERANCE)
+        self._q, self._reserve = q, 0.0
 
     def step(self, q: JointVector) -> Remark | None:
         """Returns which links touch, or are closer than at the start if they touched there, or None.
@@ -39,5 +48,8 @@ class SelfCollisionWatch:
         Args:
             q: Measured joint angles, shape (7,), [rad].
         """
+        if self._levers.dot(np.abs(q - self._q)) < self._reserve:  # No point of the arm has moved farther.
+            return None
         distance, links = self._query.links(q)
+        self._q, self._reserve = q, distance - self._smallest
         return Remark(f"{links} touch", "links_touch") if distance < self._smallest else None
