@@ -182,7 +182,9 @@ def test_loading_a_model_by_name_loads_neither_wire_nor_engine_nor_client_librar
     assert result.stdout.split() == []
 
 
-@MAKERS
+@pytest.mark.parametrize(
+    "maker", [maker for maker in all_makers() if maker.capabilities.simulates], ids=lambda maker: maker.name
+)
 def test_a_maker_is_patient_if_its_virtual_controller_is(maker: Maker):
     name = next(iter(maker.robots))
     if not maker.capabilities.simulates:

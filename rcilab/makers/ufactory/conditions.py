@@ -1,0 +1,131 @@
+"""The conditions of UFACTORY controllers: the common rows with the maker's bounds and error codes.
+
+Targets of mode 1 (servo) are checked at the rate at which they are sent; the controller itself plans the motions of the
+other modes within these bounds. The manual publishes ranges, speeds, accelerations and jerks, but not which of its
+errors a target beyond an acceleration or a jerk raises: the remedy of C24 names accelerations, that of C25 the path.
+
+The interface has no arm angle and takes no torques, so there are no rows on them. A reduced mode sets ranges and
+speeds within these, and a safety boundary is the box of `cartesian.position`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from rcilab.conformance.common_conditions import (
+    CARTESIAN_FRAME,
+    CARTESIAN_POSITION,
+    EXTERNAL_TORQUE,
+    JOINT_CONDITIONS,
+    JOINT_END_CONDITIONS,
+    MEASURED_CONDITIONS,
+    MOTION_TORQUE_CONDITIONS,
+    START_POSE,
+    TOOL_CONDITIONS,
+    TOOL_STANDSTILL_CONDITIONS,
+)
+from rcilab.core.condition import Condition, ConditionTable, symmetric_bounds
+from rcilab.makers.ufactory.bounds import SERVO_STEP
+from rcilab.makers.ufactory.errors import UfactoryError
+
+_MANUAL = "user manual of UFACTORY Studio"
+_RATE_ERRORS = (UfactoryError.JOINT_RANGE, UfactoryError.SPEED, UfactoryError.SPEED, UfactoryError.PLANNING)
+"""By order of the derivative."""
+
+_JOINTS = tuple(
+    replace(row, fault=fault, source=f"{_MANUAL}, 10 and 12" + ("" if row.order < 2 else " (code: rcilab)"))
+    for row, fault in zip(JOINT_CONDITIONS, _RATE_ERRORS, strict=True)
+)
+_TORQUE = replace(MOTION_TORQUE_CONDITIONS[0], source="maker's description package, effort (gravity excepted)")
+_ENDS = tuple(
+    replace(row, source=f"{_MANUAL}, 9, servo mode: continuous targets (tolerance: rcilab)")
+    for row in JOINT_END_CONDITIONS
+)
+_TOOL_RATES = tuple(
+    replace(
+        row,
+        fault=_RATE_ERRORS[row.order],
+        source=f"{_MANUAL}, 10 and 12 (norm: rcilab)" if row.signal == "translation" else "bound: see the arm's limits",
+    )
+    for row in TOOL_CONDITIONS
+    if row.signal in ("translation", "rotation")
+)
+_SERVO_SPEED = replace(
+    _TOOL_RATES[0], fault=UfactoryError.SERVO_LINEAR_SPEED, source="client library, table of codes, 60"
+)
+"""On the tool of a motion that is sent as joint angles."""
+
+_BOX = replace(CARTESIAN_POSITION, fault=UfactoryError.SAFETY_BOUNDARY, source=f"{_MANUAL}, 6.3.1 and 12")
+_FRAME = replace(CARTESIAN_FRAME, fault=UfactoryError.KINEMATICS, source=f"{_MANUAL}, 12 (singular: rcilab)")
+_FIRST_STEP = replace(
+    START_POSE,
+    formula=f"|p_c - p| < {1e3 * SERVO_STEP:g} mm",
+    necessity="necessary",
+    fault=UfactoryError.SPEED,
+    source=f"{_MANUAL}, 9, servo mode: steps of at most {1e3 * SERVO_STEP:g} mm (code: rcilab)",
+    bounds=lambda limits: symmetric_bounds(SERVO_STEP),
+)
+_TOOL_ENDS = tuple(
+    replace(row, source=f"{_MANUAL}, 9, servo mode: continuous targets (tolerance: rcilab)")
+    for row in TOOL_STANDSTILL_CONDITIONS
+)
+
+_MEASURED_ERRORS = {
+    ("joint", 0): UfactoryError.JOINT_RANGE,
+    ("position", 0): UfactoryError.SAFETY_BOUNDARY,
+    ("joint", 1): UfactoryError.MEASURED_SPEED,
+    ("translation", 1): UfactoryError.MEASURED_SPEED,
+    ("rotation", 1): UfactoryError.MEASURED_SPEED,
+}
+_MEASURED = tuple(
+    replace(
+        row,
+        fault=_MEASURED_ERRORS[row.signal, row.order],
+        source=f"{_MANUAL}, 12; bound: the commanded one with rcilab's allowance",
+    )
+    for row in MEASURED_CONDITIONS
+    if (row.signal, row.order) in _MEASURED_ERRORS
+)
+_BEHAVIOUR = (
+    *_MEASURED,
+    replace(
+        EXTERNAL_TORQUE,
+        fault=UfactoryError.COLLISION,
+        source=f"{_MANUAL}, 12; the threshold follows from the collision sensitivity, the maker gives no figure",
+    ),
+    Condition(
+        id="links.distance",
+        quantity="distance between links",
+        formula="d > 0",
+        necessity="necessary",
+        unit="m",
+        source=f"{_MANUAL}, 6.4.3 and 12; bound: rcilab, the manual has no distance",
+        fault=UfactoryError.SELF_COLLISION,
+        stage="throughout",
+        signal="link_distance",
+        order=0,
+        bounds=lambda limits: (np.array([0.0]), np.array([math.inf])),
+    ),
+)
+
+_MOTION = (*_JOINTS, _SERVO_SPEED, _TORQUE, *_ENDS)
+_CARTESIAN = (_FRAME, *_TOOL_RATES, *_JOINTS, _TORQUE, _FIRST_STEP, *_TOOL_ENDS)
+
+UFACTORY_CONDITIONS = ConditionTable(
+    name="xArm interface",
+    motion=_MOTION,
+    cartesian=_CARTESIAN,
+    torque=(),
+    measured=_MEASURED,
+    box=_BOX,
+    conditions=(*_MOTION, _BOX, *_CARTESIAN, *_BEHAVIOUR),
+)
+"""The rows for `check` and the monitors."""
+
+
+def ufactory_conditions() -> ConditionTable:
+    """Returns the conditions of the interface."""
+    return UFACTORY_CONDITIONS

@@ -1,0 +1,70 @@
+"""UFACTORY: the arms xArm6, xArm7, Lite6 and 850, their errors and conditions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NoReturn
+
+from rcilab.core.condition import ConditionTable
+from rcilab.core.errors import InvalidValueError
+from rcilab.makers.maker import Capabilities, Timing
+from rcilab.makers.ufactory.bounds import CLIENT_PORT, LONGEST_TOOL, SINGLE_PRECISION
+from rcilab.makers.ufactory.conditions import UFACTORY_CONDITIONS
+from rcilab.makers.ufactory.errors import UfactoryError
+from rcilab.makers.ufactory.robots import ROBOTS
+
+if TYPE_CHECKING:
+    from rcilab.makers.driver import ExpectedArm
+    from rcilab.makers.parameters import ParameterGroup
+    from rcilab.makers.scenario import FaultScenario
+    from rcilab.model.robot_model import RobotModel
+    from rcilab.sim.controller_config import ControllerConfig
+    from rcilab.sim.maker_server import MakerServer
+    from rcilab.sim.virtual_arm import VirtualArm
+
+
+class Ufactory:
+    """The maker of the xArms, the Lite6 and the 850."""
+
+    name = "ufactory"
+    title = "UFACTORY"
+    interface = "the xArm interface"
+    scheme = "xarm"
+    robots = ROBOTS
+    client_port = CLIENT_PORT
+    capabilities = Capabilities(longest_tool=LONGEST_TOOL)
+    timing = Timing()
+
+    def conditions(self) -> ConditionTable:
+        """Returns the conditions of the interface."""
+        return UFACTORY_CONDITIONS
+
+    def parameters(self, model: RobotModel) -> tuple[ParameterGroup, ...]:
+        """Returns no parameters."""
+        return ()
+
+    def scenarios(self, model: RobotModel) -> tuple[FaultScenario, ...]:
+        """Returns no scenarios."""
+        return ()
+
+    def parse_address(self, text: str) -> NoReturn:
+        """Raises InvalidValueError: rcilab has no driver for these arms."""
+        raise InvalidValueError("address", text, "is that of a UFACTORY arm, which rcilab does not drive; simulate it")
+
+    def open_driver(self, address: str, timeout: float, expected: ExpectedArm | None) -> NoReturn:
+        """Raises InvalidValueError, as `parse_address`."""
+        self.parse_address(address)
+
+    def state_rounding(self, model: RobotModel) -> float:
+        """Returns that of single precision."""
+        return SINGLE_PRECISION
+
+    def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:
+        """Not called: `capabilities.simulates` is False."""
+        raise NotImplementedError
+
+    def faults(self) -> type[UfactoryError]:
+        """Returns the errors of the controller."""
+        return UfactoryError
+
+
+MAKER = Ufactory()
