@@ -32,6 +32,7 @@ def test_every_limit_has_a_source(name):
     places = {
         "rokae": "RCI user manual V1.3.1, 4.4",
         "franka": "Franka's page",
+        "ufactory": "user manual of UFACTORY Studio, 10",
         "realman": "the maker's client library",
     }
     assert places[model.description.maker] in limits.source("joint.velocity")

@@ -25,7 +25,7 @@ def states(model, count=5):
 @pytest.mark.parametrize("name", ROBOT_NAMES)
 @pytest.mark.parametrize("friction", [False, True])
 def test_a_table_gives_what_its_rows_give(name, friction):
-    model = load_model(name, load=Payload(mass=2.0, center_of_mass=(0.01, 0.02, 0.05)))
+    model = load_model(name, load=Payload(mass=0.5, center_of_mass=(0.01, 0.02, 0.05)))
     q, dq, ddq = states(model)
     table = model.torque(q, dq, ddq, friction=friction)
     for row in range(len(q)):

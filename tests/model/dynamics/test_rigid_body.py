@@ -28,7 +28,7 @@ def test_full_torque_is_the_sum_of_its_terms(name):
 
 @pytest.mark.parametrize("name", ROBOT_NAMES)
 def test_gravity_torque_is_the_slope_of_the_potential_energy(name):
-    model = load_model(name, load=Payload(mass=2.0, center_of_mass=(0.01, 0.02, 0.05)))
+    model = load_model(name, load=Payload(mass=0.5, center_of_mass=(0.01, 0.02, 0.05)))
     q, _, _ = random_state(model)
     step = 1e-6  # [rad]
     slope = [
@@ -69,7 +69,7 @@ def test_a_load_that_is_none_is_refused():
 
 @pytest.mark.parametrize("name", ROBOT_NAMES)
 def test_what_a_motion_takes_beyond_gravity_is_the_same_row_by_row_and_all_at_once(name):
-    model = load_model(name).with_load(Payload(mass=2.0, center_of_mass=(0.01, 0.02, 0.05)))
+    model = load_model(name).with_load(Payload(mass=0.5, center_of_mass=(0.01, 0.02, 0.05)))
     states = [random_state(model, seed) for seed in range(5)]
     together = model.rigid_body.motion_torques(*(np.array(column) for column in zip(*states, strict=True)))
     terms = [model.torque(*state) for state in states]
@@ -80,7 +80,7 @@ def test_what_a_motion_takes_beyond_gravity_is_the_same_row_by_row_and_all_at_on
 @pytest.mark.parametrize("name", ROBOT_NAMES)
 def test_all_terms_at_once_are_those_of_the_single_questions(name):
     tool = Pose.from_rpy([0.0, 0.05, 0.1], [0.2, 0.1, -0.7])
-    model = load_model(name, tool=tool, load=Payload(mass=2.0, center_of_mass=(0.01, 0.02, 0.05)))
+    model = load_model(name, tool=tool, load=Payload(mass=0.5, center_of_mass=(0.01, 0.02, 0.05)))
     body, (q, dq, ddq) = model.rigid_body, random_state(model)
     terms, torque, step = body.tool_terms(q, dq), model.torque(q, dq, ddq), 1e-6  # [s]
     np.testing.assert_allclose(terms.mass_inverse @ body.mass_matrix(q), np.eye(model.n), atol=1e-9)
