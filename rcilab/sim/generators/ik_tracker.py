@@ -16,6 +16,11 @@ _CONVERGING = 1e-8  # [m], [rad] The next step reduces a smaller error to roundi
 _NEAR = 1e-3  # [m], [rad] The Jacobian of a smaller error serves for the following steps, too.
 _MOST_STEPS = 10
 _LARGEST_STEP = 0.1  # [rad] A larger one leaves the last angles.
+_MOST_DAMPED_STEPS = 40
+_FARTHEST = 0.6  # [rad] That a joint may be from the last angles after damped steps.
+_DAMPING = 0.1  # Of damped steps, times the square of the error in metres and radians; a tuning value.
+_CONVERGED = 1e-20  # [m^2], [rad^2]
+_EYE = np.eye(6)
 _SMALLEST = 1e-8  # Determinant of J J^T, in metres and radians: about 1e-3 in a usual pose.
 
 
@@ -92,6 +97,28 @@ class IkTracker:
                 jacobian, error = self._differential(q, T_base_tool)
                 square = jacobian.dot(jacobian.T)
         raise UnreachableError("no joint angles near the last ones put the tool there")
+
+    def approach(self, T_base_tool: Pose, near: Sequence[float]) -> list[float] | None:
+        """Returns the joint angles of a pose, [rad], reached by damped steps from others, or None if they are not near.
+
+        The steps are defined at a singularity, too, where an arm may pass or begin: for poses that its branches do not
+        give there.
+
+        Args:
+            T_base_tool: Pose of the tool in base.
+            near: Joint angles close to it, n plain floats, [rad].
+        """
+        q = np.array(near)
+        for _ in range(_MOST_DAMPED_STEPS):
+            J, error = self._differential(q, T_base_tool)
+            residual = np.array(error)
+            square = float(residual @ residual)
+            if square < _CONVERGED:
+                return q.tolist()
+            q = q + J.T @ np.linalg.solve(J @ J.T + _DAMPING * square * _EYE, residual)
+            if np.abs(q - near).max() > _FARTHEST:
+                return None
+        return None
 
     def _step_to(self, T_base_tool: Pose, held: int, psi: float, near: Sequence[float]) -> list[float] | None:
         """Returns the joint angles near the last ones with one joint held at `psi`, or None if they are not near."""

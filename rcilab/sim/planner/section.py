@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from rcilab.core.arrays import Array
+from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose, rotation_from_wxyz
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.blend import Blend
@@ -76,7 +77,11 @@ class PoseSolver:
         Raises:
             KinematicsError: The pose is out of reach or singular.
         """
-        return self._tracker.follow(pose, near) if self._is_redundant else self._tracker.solve(pose, 0.0, near)
+        try:
+            return self._tracker.follow(pose, near)
+        except KinematicsError:
+            q = self._tracker.approach(pose, near)  # A path may begin at a singularity, or pass through it.
+            return self.nearest(pose, near) if q is None else q
 
     def nearest(self, pose: Pose, near: Sequence[float]) -> list[float]:
         """Returns the joint angles of any pose, [rad]; a redundant joint, or the arm angle, stays that of `near`.

@@ -34,7 +34,7 @@ from rcilab.makers.franka.controller.phases import (
 )
 from rcilab.makers.franka.controller.pose_deviation import PoseDeviations, find_deviation
 from rcilab.makers.franka.controller.reporter import StateReporter
-from rcilab.makers.franka.controller.self_collision import SelfCollisionWatch
+from rcilab.sim.self_collision import SelfCollisionWatch
 from rcilab.makers.franka.controller.settings import Settings, apply_request, apply_setup
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.limit_tables import DEFAULT_TABLE, cartesian_limits, require_table
