@@ -4,7 +4,8 @@
     JOINT_IMPEDANCE       springs at the joints act towards the commanded angles
     CARTESIAN_IMPEDANCE   springs at the tool act towards the commanded pose, and the desired wrench is
                           added; both along the force axes, at the tool's origin
-    TORQUE                the commanded torques act, gravity and friction are compensated
+    TORQUE                the commanded torques act, gravity and friction are compensated; where a maker has no bound
+                          of commands, larger ones than the arm's torque act as that
     GUIDE                 the arm is weightless and is guided by hand
     BRAKED                the brakes hold
 
@@ -78,6 +79,7 @@ class Actuator:
         self._model = model
         self._parameters = parameters
         self._soft_limits = parameters.soft_limits(model.limits.joint)
+        self._largest_torque: list[float] = model.limits.joint.torque.tolist()
 
     def begin_guiding(self, freedom: GuidedFreedom, measured: Measurement) -> None:
         """Begins hand guiding; the directions that are not free are held at the present pose."""
@@ -110,7 +112,8 @@ class Actuator:
         if not law.is_compliant:
             return Setpoint(law.drive, commanded.q, commanded.dq, commanded.ddq, None, commanded.arrays)
         if law is ControlLaw.TORQUE:
-            torque = [0.0] * len(commanded.q) if tau is None else tau
+            largest = self._largest_torque
+            torque = [0.0] * len(largest) if tau is None else [min(max(x, -y), y) for x, y in zip(tau, largest)]  # noqa: B905
         else:
             torque = self._compliance(law, commanded, tool_c, measured)
             box = self._parameters.guiding_box

@@ -98,6 +98,7 @@ class PoseReference:
         turn = hypot(*rotation_between(rotation, pose.parts[0]))
         lag = remainder(psi - self.psi, tau)
         if not (translation or turn or lag):
+            self._joints_have_begun = self._bounds.is_strict_start
             return False
         if self._bounds.is_strict_start:
             is_distorted = _SMALL_TURN < turn <= distortion

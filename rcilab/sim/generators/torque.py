@@ -3,8 +3,7 @@
 The commanded torques pass the torque filter, then the conditions of torques. The torque before the first command is
 zero, so the first one may differ from zero by one cycle's torque rate. A lost cycle holds the last torque, or, if a
 later command is already known, interpolates linearly to it. The conditions apply to the received commands, over the
-cycles between them, or to every cycle where held torques count as commands (`MotionLimits`). Where a maker has no bound
-of torques, larger ones than the arm's act as the arm's.
+cycles between them, or to every cycle where held torques count as commands (`MotionLimits`).
 """
 
 from __future__ import annotations
@@ -38,7 +37,6 @@ class TorqueGenerator:
         self._counts_replacements = bounds.counts_replacements
         self._stream = CommandExtrapolator(nothing)
         self._filter = LowPass(bounds.parameters.torque_filter, nothing)
-        self._largest: list[float] = bounds.model.limits.joint.torque.tolist()
         self._monitor = TorqueMonitor(bounds.limits.joint)
         self._monitor.reset(nothing)
 
@@ -64,7 +62,7 @@ class TorqueGenerator:
         tau = self._filter.step(tau)
         if cycles > 0 and (violations := self._monitor.step(tau, cycles)):
             return GeneratorOutput(violations=tuple(violations))
-        return GeneratorOutput(tau=[min(max(x, -most), most) for x, most in zip(tau, self._largest, strict=True)])
+        return GeneratorOutput(tau=tau)
 
     def _check_ahead(self, tau: list[float], steps: int) -> list[LimitViolation]:
         """Returns the violations of torques that are due later: the way to them begins in this cycle."""

@@ -35,7 +35,7 @@ from rcilab.makers.franka.wire.requests import (
 )
 from rcilab.model.dynamics.payload import Payload, combine_payloads
 from rcilab.robots import RobotDescription
-from rcilab.sim.arm_parameters import ArmParameters
+from rcilab.sim.arm_parameters import ArmParameters, ForceAxesKind
 from rcilab.sim.arm_setup import ArmSetup
 from rcilab.sim.contact_detector import ContactThresholds
 from rcilab.sim.filters import SAMPLING_RATE
@@ -63,6 +63,7 @@ class Settings(ArmParameters):
     """The nominal end-effector frame in the flange frame: that of the hand, if there is one."""
     NE_T_EE: Pose = IDENTITY
     EE_T_K: Pose = IDENTITY
+    """The stiffness frame K: along its axes act the springs of Cartesian impedance, at the end effector's origin."""
     end_effector: Payload
     """The hand, in the flange frame."""
     client_load: Payload
@@ -82,6 +83,7 @@ class Settings(ArmParameters):
             collision_thresholds=(inf,) * arm.n,
             joint_stiffness=JOINT_STIFFNESS,
             cartesian_stiffness=DEFAULT_CARTESIAN_STIFFNESS,
+            force_axes=ForceAxesKind.TOOL,
             end_effector=Payload(),
             client_load=Payload(),
         )
@@ -131,7 +133,8 @@ def apply_request(settings: Settings, request: Request) -> Settings:
         case SetGuidingMode(axes=axes, elbow=elbow):
             return replace(settings, free_axes=tuple(map(bool, axes)), free_elbow=bool(elbow))
         case SetEEToK(EE_T_K=numbers):
-            return replace(settings, EE_T_K=pose_from_columns("EE_T_K", numbers))
+            K = pose_from_columns("EE_T_K", numbers)
+            return replace(settings, EE_T_K=K, T_flange_force=settings.T_flange_tool @ K)
         case SetNEToEE(NE_T_EE=numbers):
             return _with_frames(replace(settings, NE_T_EE=pose_from_columns("NE_T_EE", numbers)))
         case SetLoad():
@@ -164,7 +167,8 @@ def pose_from_columns(name: str, numbers: Sequence[float]) -> Pose:
 
 
 def _with_frames(settings: Settings) -> Settings:
-    return replace(settings, T_flange_tool=settings.F_T_NE @ settings.NE_T_EE)
+    tool = settings.F_T_NE @ settings.NE_T_EE
+    return replace(settings, T_flange_tool=tool, T_flange_force=tool @ settings.EE_T_K)
 
 
 def _with_bodies(settings: Settings) -> Settings:

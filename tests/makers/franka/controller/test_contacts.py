@@ -10,10 +10,11 @@ import pytest
 from rcilab.core.spatial import Pose
 from rcilab.makers.franka.controller.fci_controller import FciController
 from rcilab.makers.franka.controller.phases import Phase
+from rcilab.makers.franka.controller.reporter import columns_of
 from rcilab.makers.franka.controller.settings import DEFAULT_THRESHOLDS
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.wire.command_packet import CommandPacket
-from rcilab.makers.franka.wire.requests import Move
+from rcilab.makers.franka.wire.requests import Move, SetCartesianImpedance, SetEEToK, SetNEToEE
 from rcilab.makers.franka.wire.state_packet import SLICES
 from rcilab.makers.franka.wire.versions import VERSION_5, Status
 from rcilab.model.robot_model import load_model
@@ -21,6 +22,7 @@ from rcilab.sim.plants import build_plant
 from rcilab.sim.virtual_arm import VirtualArm
 
 MODEL = load_model("Panda")
+FAR = (10.0, 3.12, 6.28)
 SETTLED = 300  # [cycles]
 ZERO = (0.0,) * 7
 
@@ -52,6 +54,25 @@ def test_forces_have_the_sign_of_what_the_arm_exerts_and_the_place_of_K(controll
     assert in_K[:3] == pytest.approx(T_base_K.rotation.T @ found[:3], abs=1e-9)
     J = MODEL.jacobian(controller.arm.signals.measured.q)
     assert field(controller, "tau_ext_hat_filtered") == pytest.approx(J.T @ [0, -4.0, 10.0, 0, 0, 0], abs=0.1)
+
+
+@pytest.mark.parametrize("turn", [0.0, np.pi / 4.0])
+def test_the_springs_of_Cartesian_impedance_act_along_the_axes_of_K(controller: FciController, turn: float) -> None:
+    stiffness = (2000.0, 300.0, 1000.0)
+    assert controller.set(SetNEToEE(columns_of(Pose.from_rpy([0.0, 0.0, 0.1], [0.2, 0.0, 0.0]))))[0] is Status.SUCCESS
+    assert controller.set(SetEEToK(columns_of(Pose.from_rpy([0.0, 0.0, 0.0], [0.0, 0.0, turn]))))[0] is Status.SUCCESS
+    assert controller.set(SetCartesianImpedance((*stiffness, 100.0, 100.0, 100.0)))[0] is Status.SUCCESS
+    assert controller.begin_move(Move(1, 2, FAR, FAR)) is Status.MOTION_STARTED
+    start = controller.arm.tool_c.pose
+    force = np.array([10.0, 0.0, 0.0])
+    controller.arm.plant.push((*force.tolist(), 0.0, 0.0, 0.0))
+    for k in range(1500):
+        packet = CommandPacket(k, ZERO, ZERO, columns_of(start), (0.0,) * 6, (0.0, -1.0), False, False, ZERO, False)
+        controller.receive(packet)
+        controller.step()
+    R = (start @ controller.settings.EE_T_K).rotation
+    moved = controller.arm.signals.tool.position - start.position
+    assert moved == pytest.approx(R @ np.diag(1.0 / np.array(stiffness)) @ R.T @ force, abs=3e-4)
 
 
 def test_a_contact_disappears_and_a_collision_stays_until_the_recovery(controller: FciController) -> None:

@@ -62,6 +62,26 @@ def test_a_tool_that_begins_with_a_step_is_followed(robot: Robot, place: FciAren
     assert (ending.status, ending.state.errors) == ("success", ())
 
 
+@pytest.mark.parametrize("share", [0.3, 0.45, 0.6, 0.75])
+def test_the_first_velocities_of_the_tool_are_checked_as_the_poses_that_they_lead_to(
+    robot: Robot, place: FciArena, share: float
+) -> None:
+    jerk = place.controller.model.limits.cartesian.translation_jerk
+    rates = share * jerk * CYCLE**2 * np.array([1.0, 0.5, 0.22, 0.07, *[0.0] * 40])
+    start = robot.move(wire.JOINT_IMPEDANCE, wire.CARTESIAN_POSE)
+    paths = (start.O_T_EE_c[14] + CYCLE * np.cumsum(rates)).tolist()
+    poses = robot.play(start, [Output(pose=(*start.O_T_EE_c[:14], z, 1.0)) for z in paths])
+    if poses.state.errors:
+        recover(robot, poses.state.errors)
+    home = place.controller.model.home.tolist()
+    place.simulate("place_arm", q=home)
+    start = robot.move(wire.JOINT_IMPEDANCE, wire.CARTESIAN_VELOCITY)
+    twists = robot.play(start, [Output(twist=(0.0, 0.0, rate, 0.0, 0.0, 0.0)) for rate in rates.tolist()])
+    assert (twists.state.errors, twists.sent) == (poses.state.errors, poses.sent)
+    if not poses.state.errors:
+        assert twists.state.O_T_EE_c[14] == pytest.approx(paths[-1], abs=1e-7)
+
+
 def test_an_orientation_that_is_a_rotation_within_its_tolerance_may_begin_a_motion(robot: Robot) -> None:
     start = robot.move(wire.JOINT_IMPEDANCE, wire.CARTESIAN_POSE)
     T = np.reshape(start.O_T_EE_c, (4, 4)).T.copy()
