@@ -22,6 +22,7 @@ TIMESTEP = 0.001  # [s] one cycle of the controller
 
 ARMATURE_PER_TORQUE = 0.0012  # [kg m^2 per N m] rotor inertia seen at the joint: 0.10 at 85 N m, 0.04 at 36 N m
 DAMPING_PER_TORQUE = 0.012  # [N m s/rad per N m] viscous friction: 1.0 at 85 N m, 0.4 at 36 N m
+_THICKNESS = 2e-9  # [kg m^2] Added to the moments of a load; twice by how much those of a `Payload` may be impossible.
 
 _VISUAL_GROUP, _COLLISION_GROUP = 2, 3  # MuJoCo's viewers show groups 0 to 2 and hide 3.
 
@@ -99,7 +100,7 @@ def build_mjcf(
     if load is not None and load.mass > 0.0:
         lines += [
             f'{pad}<body name="load"{orientation}>',
-            f"{pad}  {_inertial(load.mass, load.center_of_mass, load.inertia)}",
+            f"{pad}  {_inertial(load.mass, load.center_of_mass, _thickened(load.inertia))}",
         ]
         lines.append(f"{pad}</body>")
     lines += ["  " * depth + "</body>" for depth in range(description.n + 2, 1, -1)]
@@ -149,6 +150,11 @@ def _body(name: str, link: Link, shape: LinkShape, meshes: bool, depth: int) -> 
         for part in shape.parts:
             lines.append(f'{pad}<geom class="visual" mesh="{name}_{part.role}" material="{part.role}"/>')
     return lines
+
+
+def _thickened(inertia: Matrix) -> Matrix:
+    """Returns the inertia of a body, flat or a line perhaps, with a thickness: MuJoCo refuses one without."""
+    return inertia + _THICKNESS * max(1.0, float(np.abs(inertia).max())) * np.eye(3)
 
 
 def _inertial(mass: float, center: Vector3, tensor: Matrix) -> str:

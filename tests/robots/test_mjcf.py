@@ -56,6 +56,28 @@ def test_gravity_and_inertia_are_those_of_the_model_with_and_without_a_load(name
             )  # a capsule's mass is 0, a load's tensor exact
 
 
+FLAT = {
+    "a line": (0.0023, 0.0023, 0.0),
+    "next to a line": (1e-300, 0.01, 0.01),
+    "less than a line": (-1e-10, 0.01, 0.01),
+    "a plate": (0.0766, 0.0446, 0.1212),
+    "more than a plate": (0.01, 0.01, 0.0200000005),
+    "the largest plate": (50.0, 50.0, 100.0),
+    "a point": (0.0, 0.0, 0.0),
+}
+"""Principal moments of loads that a controller accepts, [kg m^2]."""
+
+
+@pytest.mark.parametrize("moments", FLAT.values(), ids=FLAT)
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_load_without_thickness_is_simulated(moments: tuple[float, ...], turned: bool) -> None:
+    R = Pose.from_rpy([0.0, 0.0, 0.0], [0.3, 0.4, 0.5]).rotation if turned else np.eye(3)
+    inertia = R @ np.diag(moments) @ R.T
+    load = Payload(mass=0.3, center_of_mass=np.array([0.0, 0.0, 0.05]), inertia=(inertia + inertia.T) / 2.0)
+    arm = mujoco.MjModel.from_xml_string(build_mjcf(load_model("xMatePro7").description, load=load))
+    assert np.sort(arm.body("load").inertia) == pytest.approx(np.sort(moments), rel=1e-8, abs=5e-9)
+
+
 @arms
 def test_ranges_and_motors_carry_the_limits_of_the_manual(name: str) -> None:
     joint = load_model(name).limits.joint
