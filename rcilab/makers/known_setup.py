@@ -48,11 +48,22 @@ def with_reported_tool(model: RobotModel, tool: Pose, name: str) -> RobotModel:
 def with_reported_load(model: RobotModel, load: Payload, name: str) -> RobotModel:
     """Returns the model with the load of its controller, if that reports it; warns if the model has another one.
 
+    Of a load above the rated payload, the model has as much as the arm is rated for, and a warning says so.
+
     Args:
         model: The arm.
         load: The load, as the controller has it.
         name: Name of the controller in the warning.
     """
+    rated = model.description.rated_payload
+    if load.mass > rated:
+        warnings.warn(
+            f"the load of {name} is {load.mass:g} kg, above the {rated:g} kg that {model.name} is rated for; the "
+            f"session goes on with {rated:g} kg of it. Check the load and the end effector that are set there",
+            stacklevel=_CALLER,
+        )
+        share = rated / load.mass
+        load = Payload(mass=rated, center_of_mass=load.center_of_mass, inertia=share * load.inertia)
     mine = model.load
     off = float(np.linalg.norm(load.center_of_mass - mine.center_of_mass)) if load.mass else 0.0
     if abs(load.mass - mine.mass) < _SAME_MASS and off < _SAME_CENTER:

@@ -9,7 +9,6 @@ CLIENT_PORT: Final = 1337
 SINGLE_PRECISION: Final = 3e-7  # [rad] or [m] Half a unit in the last place of a float below 4 is at most 2.4e-7.
 """Rounding in the states of version 10."""
 LONGEST_TOOL: Final = 2.0  # [m] Distance of a frame, or of a centre of mass, from the flange; rcilab's own bound.
-HEAVIEST_LOAD: Final = 20.0  # [kg] rcilab's own bound; the rated payload is 3 kg.
 LARGEST_JOINT_STIFFNESS: Final = 14250.0  # [N m/rad] Comments of libfranka's robot.h, as the two below.
 CARTESIAN_STIFFNESS: Final = ((10.0, 3000.0), (1.0, 300.0))
 """Smallest and largest, along an axis and about it, [N/m], [N m/rad]."""

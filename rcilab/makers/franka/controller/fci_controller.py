@@ -233,7 +233,7 @@ class FciController:
         """
         if self.phase not in _STILL or not self.arm.is_standstill:
             raise UsageError(f"the arm cannot be set up or placed in phase {self.phase_name}; end its motion first")
-        settings = apply_setup(self.settings, setup)
+        settings = apply_setup(self.settings, setup, self.model.description)
         if setup.q is not None:
             require_stand(self.model.with_tool(settings.T_flange_tool), setup.q, settings, self.arm.plant)
         self._configure(settings)
@@ -334,7 +334,7 @@ class FciController:
         if isinstance(request, _MOVES_THE_TOOL) and not self.arm.has_stopped:
             return Status.NOT_POSSIBLE, "not possible while the arm moves"
         try:
-            settings = apply_request(self.settings, request)
+            settings = apply_request(self.settings, request, self.model.description)
         except InvalidValueError as error:
             return Status.INVALID_ARGUMENT, str(error)
         self._configure(settings)

@@ -17,7 +17,6 @@ from rcilab.makers.franka.bounds import (
     CARTESIAN_STIFFNESS,
     DEFAULT_CARTESIAN_STIFFNESS,
     DEFAULT_THRESHOLD,
-    HEAVIEST_LOAD,
     JOINT_STIFFNESS,
     LARGEST_JOINT_STIFFNESS,
     LONGEST_TOOL,
@@ -89,13 +88,13 @@ class Settings(ArmParameters):
         )
 
 
-def apply_setup(settings: Settings, setup: ArmSetup) -> Settings:
+def apply_setup(settings: Settings, setup: ArmSetup, arm: RobotDescription) -> Settings:
     """Returns the settings with a tool or a load of a configuration, as on Franka's Desk: those of the end effector.
 
     What a client sets with setNEToEE and setLoad comes on top of them.
 
     Raises:
-        InvalidValueError: The controller has no such setting: no safety box, no soft limits.
+        InvalidValueError: The controller has no such setting (no safety box, no soft limits), or the load is too heavy.
     """
     if setup.safety_box is not None:
         raise InvalidValueError("safety box", setup.safety_box, "cannot be set: this controller has none")
@@ -104,16 +103,17 @@ def apply_setup(settings: Settings, setup: ArmSetup) -> Settings:
     if setup.T_flange_tool is not None:
         settings = _with_frames(replace(settings, F_T_NE=setup.T_flange_tool, NE_T_EE=IDENTITY))
     if setup.load is not None:
-        settings = _with_bodies(replace(settings, end_effector=setup.load))
+        settings = _with_bodies(replace(settings, end_effector=setup.load), arm)
     return settings
 
 
-def apply_request(settings: Settings, request: Request) -> Settings:
+def apply_request(settings: Settings, request: Request, arm: RobotDescription) -> Settings:
     """Returns the settings with the values of a request.
 
     Args:
         settings: The settings before.
         request: A setter; other requests have no effect.
+        arm: The arm, for the load that it bears.
 
     Raises:
         InvalidValueError: A value is out of its bounds; it names the first.
@@ -138,7 +138,7 @@ def apply_request(settings: Settings, request: Request) -> Settings:
         case SetNEToEE(NE_T_EE=numbers):
             return _with_frames(replace(settings, NE_T_EE=pose_from_columns("NE_T_EE", numbers)))
         case SetLoad():
-            return _with_bodies(replace(settings, client_load=_load(request)))
+            return _with_bodies(replace(settings, client_load=_load(request)), arm)
         case SetFilters(frequencies=values):
             for value in values:
                 _require("filter frequency", value, LOWEST_FREQUENCY, SAMPLING_RATE, "Hz")
@@ -171,12 +171,17 @@ def _with_frames(settings: Settings) -> Settings:
     return replace(settings, T_flange_tool=tool, T_flange_force=tool @ settings.EE_T_K)
 
 
-def _with_bodies(settings: Settings) -> Settings:
+def _with_bodies(settings: Settings, arm: RobotDescription) -> Settings:
+    mounted, mass = settings.end_effector.mass, settings.client_load.mass
+    if mounted + mass > arm.rated_payload:
+        what = f"kg and {mounted:g} kg of the end effector are" if mounted else "kg is"
+        raise InvalidValueError(
+            "mass", float(f"{mass:.9g}"), f"{what} above {arm.rated_payload:g} kg, the rated payload"
+        )
     return replace(settings, load=combine_payloads(settings.end_effector, settings.client_load))
 
 
 def _load(request: SetLoad) -> Payload:
-    _require("mass", request.mass, 0.0, HEAVIEST_LOAD, "kg")
     _require("distance of the centre of mass", hypot(*request.center), 0.0, LONGEST_TOOL, "m")
     return Payload(
         mass=request.mass,

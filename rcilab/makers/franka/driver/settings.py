@@ -17,7 +17,7 @@ from rcilab.core.errors import CommandRejectedError, ConnectionLostError, Deadli
 from rcilab.core.fault import name_faults
 from rcilab.core.spatial import IDENTITY, Pose, as_pose
 from rcilab.core.state import RobotMode
-from rcilab.makers.franka.bounds import CARTESIAN_STIFFNESS, HEAVIEST_LOAD, LARGEST_JOINT_STIFFNESS, LONGEST_TOOL
+from rcilab.makers.franka.bounds import CARTESIAN_STIFFNESS, LARGEST_JOINT_STIFFNESS, LONGEST_TOOL
 from rcilab.makers.franka.driver.client import FciClient, columns_of
 from rcilab.makers.franka.driver.state_reader import errors_of
 from rcilab.makers.setting_values import bounded_vector
@@ -37,6 +37,7 @@ _REASONS = {
     RobotMode.OTHER: ("not_ready", "the arm is not ready: unlock its joints and activate FCI in Desk"),
 }
 """Why a request is refused: the key of its text, and the sentence."""
+_MASS_DIGITS = 6  # [kg] That single precision has of a load; 3 kg must not become more than the arm is rated for.
 _STATE_TIMEOUT = 1.0  # [s] For a state that shows a change; they come every millisecond.
 _RECOVERY_TIMEOUT = 3.0  # [s] For the error flags to clear after the controller has accepted the recovery.
 
@@ -184,12 +185,12 @@ def find_reason(client: FciClient) -> tuple[str, str] | None:
 
 
 def as_load(mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> Payload:
-    """Returns a load if a controller accepts it.
+    """Returns a load as a body; how heavy it may be is a matter of the arm.
 
     Raises:
-        InvalidValueError: It is not a possible body, too heavy or too far away.
+        InvalidValueError: It is not a possible body, or too far away.
     """
-    kilograms = float(bounded_vector("mass", [mass], ("",), "kg", 0.0, HEAVIEST_LOAD)[0])
+    kilograms = float(bounded_vector("mass", [mass], ("",), "kg", 0.0)[0])
     center = bounded_vector("center_of_mass", center_of_mass, _AXES[:3], "m")
     _require_near("center_of_mass", center)
     return Payload(mass=kilograms, center_of_mass=center, inertia=inertia)  # type: ignore[arg-type]  # Checked there.
@@ -201,11 +202,15 @@ def pose_of(columns: list[float]) -> Pose:
 
 
 def body_of(mass: float, center: list[float], inertia: list[float]) -> Payload:
-    """Returns a body of a state."""
-    if mass == 0.0:
+    """Returns a body of a state, with the nearest inertia of a possible one: single precision rounds its numbers."""
+    kilograms = round(mass, _MASS_DIGITS)
+    if kilograms == 0.0:
         return Payload()
-    moments = np.array(inertia).reshape(3, 3)
-    return Payload(mass=mass, center_of_mass=np.array(center), inertia=(moments + moments.T) / 2.0)
+    tensor = np.array(inertia).reshape(3, 3)
+    moments, axes = np.linalg.eigh((tensor + tensor.T) / 2.0)
+    moments = np.maximum(moments, 0.0)
+    moments[2] = min(moments[2], moments[0] + moments[1])
+    return Payload(mass=kilograms, center_of_mass=np.array(center), inertia=axes * moments @ axes.T)
 
 
 def _near_pose(name: str, value: object) -> Pose:

@@ -45,6 +45,7 @@ BAD = {
     "frame EE far away": ("set_ne_to_ee", wire.doubles(*IDENTITY[:12], 3.0, 0.0, 0.0, 1.0)),
     "mass below zero": ("set_load", wire.doubles(-0.1, 0.0, 0.0, 0.0, *TENSOR)),
     "mass no number": ("set_load", wire.doubles(NAN, 0.0, 0.0, 0.0, *TENSOR)),
+    "mass above the rated one": ("set_load", wire.doubles(3.0000001, 0.0, 0.0, 0.0, *TENSOR)),
     "inertia of no body": ("set_load", wire.doubles(1.0, 0.0, 0.0, 0.0, -1.0, *TENSOR[1:])),
     "inertia no number": ("set_load", wire.doubles(1.0, 0.0, 0.0, 0.0, *TENSOR[:8], INF)),
     "filter too low": ("set_filters", wire.doubles(0.5, *(100.0,) * 4)),
@@ -90,12 +91,15 @@ def test_a_value_out_of_its_bounds_is_an_invalid_argument_and_changes_nothing(
 def test_a_refusal_is_one_line_that_names_the_value_and_its_bound(version: int) -> None:
     with fci_arena(version) as place, place.connect() as robot:
         robot.ask(*BAD["stiffness too high"])
-        robot.ask("set_load", BAD["mass below zero"][1])
+        robot.ask("set_load", BAD["mass above the rated one"][1])
+        assert place.simulate("set_load", mass=0.73)["ok"]
+        robot.ask("set_load", wire.doubles(2.5, 0.0, 0.0, 0.0, *TENSOR))
         robot.skip(2)
         invalid = "was answered: an argument is not valid;"
         assert place.log("refused") == [
             f"SetJointImpedance {invalid} stiffness of joint 7: 14251.0 N m/rad is outside 0 to 14250 N m/rad",
-            f"SetLoad {invalid} mass: -0.1 kg is outside 0 to 20 kg",
+            f"SetLoad {invalid} mass: 3.0000001 kg is above 3 kg, the rated payload",
+            f"SetLoad {invalid} mass: 2.5 kg and 0.73 kg of the end effector are above 3 kg, the rated payload",
         ]
 
 
@@ -115,6 +119,14 @@ def test_frames_and_load_are_in_the_state_and_move_the_tool(robot: Robot) -> Non
     assert after.m_ee == (0.0,)
     assert after.tau_J[1] != pytest.approx(before.tau_J[1], abs=0.1)  # It bears the load now.
     assert after.tau_ext_hat_filtered == programs.ZERO
+
+
+def test_the_load_may_be_a_line_without_thickness(toucher: Robot) -> None:
+    assert (
+        toucher.ask("set_load", wire.doubles(0.3, 0.0, 0.0, 0.05, 0.0023, 0, 0, 0, 0.0023, 0, 0, 0, 0)).status
+        == "success"
+    )
+    assert toucher.skip(3).m_load == pytest.approx((0.3,))
 
 
 def test_a_soft_joint_gives_way_and_a_stiff_one_less(toucher: Robot, felt: FciArena) -> None:

@@ -12,7 +12,9 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.execution.session import connect
 from rcilab.makers.configuration import ControllerParameters, RobotConfiguration
+from rcilab.makers.franka.driver.settings import body_of
 from rcilab.makers.franka.errors import FrankaError
+from rcilab.makers.known_setup import with_reported_load
 from rcilab.makers.maker import parameters_of
 from rcilab.makers.parameters import default_parameters
 from rcilab.model.dynamics.payload import Payload
@@ -159,3 +161,32 @@ def test_a_session_that_sends_nothing_has_tool_and_load_of_the_controller(name):
     said = [str(warning.message) for warning in warned]
     assert any("the tool of" in text and "180.3 mm" in text for text in said), said
     assert any("the load of" in text and "is 1 kg, that of the model 2 kg" in text for text in said), said
+
+
+PLATE = Payload(mass=1.0, center_of_mass=np.array([0.0, 0.0, 0.05]), inertia=np.diag([0.0766, 0.0446, 0.1212]))
+
+
+def test_a_flat_load_is_read_back_from_a_state_that_rounds_it(robot):
+    robot.set_load(PLATE.mass, PLATE.center_of_mass, PLATE.inertia)
+    assert robot.fci.load.mass == PLATE.mass
+    assert robot.fci.load.inertia == pytest.approx(PLATE.inertia, abs=1e-7)
+
+
+@pytest.mark.parametrize("mass", [0.1, 0.73, 2.27, 3.0])
+def test_a_body_of_a_state_is_the_nearest_possible_one(mass):
+    rng = np.random.default_rng(4)
+    for _ in range(200):
+        axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        for moments in (rng.uniform(0.0, 0.1, 2) @ [[1, 0, 1], [0, 1, 1]], (0.02, 0.02, 0.0)):  # Plates and lines.
+            tensor = axes * moments @ axes.T
+            body = body_of(float(np.float32(mass)), [0.0, 0.0, 0.05], np.float32(tensor).astype(float).ravel().tolist())
+            assert body.mass == mass
+            assert body.inertia == pytest.approx(tensor, abs=2e-8)
+
+
+def test_a_session_goes_on_with_the_rated_part_of_a_load_that_is_too_heavy():
+    heavy = Payload(mass=6.0, center_of_mass=np.array([0.0, 0.0, 0.05]), inertia=np.diag([0.02, 0.02, 0.01]))
+    with pytest.warns(UserWarning, match="the load of here is 6 kg, above the 3 kg that Panda is rated for"):
+        load = with_reported_load(load_model("Panda"), heavy, "here").load
+    assert (load.mass, load.center_of_mass[2]) == (3.0, 0.05)
+    assert load.inertia == pytest.approx(heavy.inertia / 2.0)
