@@ -100,7 +100,7 @@ def plan_standstill(
 
 
 class Stepper:
-    """Moves every axis time-optimally towards a velocity or a position, one cycle per call.
+    """Moves every axis independently and time-optimally towards a velocity or a position, one cycle per call.
 
     Owned by the thread that runs the cycle. Ruckig computes a new curve only after a change of target or state.
 
@@ -115,8 +115,11 @@ class Stepper:
         ddq: Accelerations, [rad/s^2].
         acceleration: Bounds, [rad/s^2].
         jerk: Bounds, [rad/s^3].
-        is_synchronized: Whether all axes arrive together, on a straight line where their state allows it.
     """
+
+    q: list[float]
+    dq: list[float]
+    ddq: list[float]
 
     def __init__(
         self,
@@ -125,14 +128,12 @@ class Stepper:
         ddq: Sequence[float],
         acceleration: Sequence[float],
         jerk: Sequence[float],
-        *,
-        is_synchronized: bool = False,
     ) -> None:
         n = len(q)
         self._ruckig = ruckig.Ruckig(n, CYCLE_TIME)
         self._out = ruckig.OutputParameter(n)
         problem = ruckig.InputParameter(n)
-        problem.synchronization = ruckig.Synchronization.Phase if is_synchronized else ruckig.Synchronization.No
+        problem.synchronization = ruckig.Synchronization.No
         problem.control_interface = _VELOCITY
         self._by_velocity = True
         self._standstill = [0.0] * n
@@ -169,6 +170,20 @@ class Stepper:
         problem.target_position = [q if end is None else end for end, q in zip(ends, self.q, strict=True)]
         problem.target_velocity = [v if end is None else 0.0 for end, v in zip(ends, dq, strict=True)]
         problem.max_velocity = [1.0 if end is None else v for end, v in zip(ends, dq, strict=True)]
+        self._step()
+
+    def step_to_moving(self, q: Sequence[float], dq: Sequence[float], velocity: Sequence[float]) -> None:
+        """Advances one cycle towards moving positions.
+
+        Args:
+            q: Positions, [rad].
+            dq: Their velocities, inside the bounds, [rad/s].
+            velocity: Bounds, above zero, [rad/s].
+        """
+        problem = self._problem
+        self._by_velocity = False
+        problem.per_dof_control_interface = [_POSITION] * len(self.q)
+        problem.target_position, problem.target_velocity, problem.max_velocity = q, dq, velocity
         self._step()
 
     def _step(self) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import JointVector, as_number, as_vector, readonly_copy
 from rcilab.core.errors import InvalidValueError, PlanningError
-from rcilab.core.limits import JointLimits
+from rcilab.core.limits import JointLimits, Limits
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion import _ruckig
 from rcilab.motion.bounds import LIMIT_MARGIN
@@ -47,6 +47,7 @@ class Jog:
             a robot reports: `derivatives_from_differences` converts.
         ddq: Their accelerations, shape (n,), [rad/s^2]; None is zero.
         speed: Part of the velocity limits, of the joints and of the tool, to use, from `MIN_SPEED` = 0.001 to 1.
+        limits: Limits to use; None: those of the model.
 
     Raises:
         InvalidValueError: Not a model, not n finite numbers each, or a speed out of range.
@@ -61,9 +62,11 @@ class Jog:
         ddq: ArrayLike | None = None,
         *,
         speed: float = 1.0,
+        limits: Limits | None = None,
     ) -> None:
         self._model = require_model(model)
-        n, limits = model.n, model.limits.joint
+        bounds = model.limits if limits is None else limits
+        n = model.n
         start = as_vector(q, n, "q", "rad")
         velocity = as_vector(np.zeros(n) if dq is None else dq, n, "dq", "rad/s")
         acceleration = as_vector(np.zeros(n) if ddq is None else ddq, n, "ddq", "rad/s^2")
@@ -72,13 +75,13 @@ class Jog:
             raise InvalidValueError(
                 "speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the limits to use"
             ).coded("span", low=f"{MIN_SPEED:g}", high="1")
-        limits, from_ends = braking_limits(limits)
-        require_stoppable(limits, start, velocity, acceleration)
-        self._lower = (limits.lower + POSITION_MARGIN + from_ends).tolist()
-        self._upper = (limits.upper - POSITION_MARGIN - from_ends).tolist()
-        self._speeds: list[float] = (LIMIT_MARGIN * speed * limits.velocity).tolist()
-        a: list[float] = (LIMIT_MARGIN * limits.acceleration).tolist()
-        j: list[float] = (LIMIT_MARGIN * limits.jerk).tolist()
+        joint, from_ends = braking_limits(bounds.joint)
+        require_stoppable(joint, start, velocity, acceleration)
+        self._lower = (joint.lower + POSITION_MARGIN + from_ends).tolist()
+        self._upper = (joint.upper - POSITION_MARGIN - from_ends).tolist()
+        self._speeds: list[float] = (LIMIT_MARGIN * speed * joint.velocity).tolist()
+        a: list[float] = (LIMIT_MARGIN * joint.acceleration).tolist()
+        j: list[float] = (LIMIT_MARGIN * joint.jerk).tolist()
         reversal = [3.0 * a_max / j_max for a_max, j_max in zip(a, j, strict=True)]  # [s] To build up and remove a.
         self._joints = list(zip(self._lower, self._upper, a, reversal, j, strict=True))
         self._ranges = list(zip(self._lower, self._upper, strict=True))
@@ -86,9 +89,9 @@ class Jog:
         self._slowest = (
             min(a),
             max(reversal),
-            float((limits.acceleration**2 / (2.0 * LIMIT_MARGIN * limits.jerk)).max()),
+            float((joint.acceleration**2 / (2.0 * LIMIT_MARGIN * joint.jerk)).max()),
         )
-        self._tool = TwistController(model, self._lower, self._upper, self._speeds, a, j, speed)
+        self._tool = TwistController(model, bounds.cartesian, self._lower, self._upper, self._speeds, a, j, speed)
         self._axes = _ruckig.Stepper(start.tolist(), velocity.tolist(), acceleration.tolist(), a, j)
         self._zero_velocity = [0.0] * n
         self._goal = self._zero_velocity

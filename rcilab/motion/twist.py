@@ -11,6 +11,7 @@ import numpy as np
 from rcilab.core.arrays import Array, Matrix
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
+from rcilab.core.limits import CartesianLimits
 from rcilab.model.kinematics.forward import build_chain
 from rcilab.model.kinematics.jacobian import tool_jacobian
 from rcilab.model.robot_model import RobotModel
@@ -53,6 +54,7 @@ class TwistController:
 
     Args:
         model: The arm, with its tool.
+        tool: Bounds of the tool.
         lower: Lower ends of the joints' ranges, at which they stop, [rad].
         upper: Upper ends, [rad].
         velocity: Bounds of the joints, [rad/s].
@@ -64,6 +66,7 @@ class TwistController:
     def __init__(
         self,
         model: RobotModel,
+        tool: CartesianLimits,
         lower: Sequence[float],
         upper: Sequence[float],
         velocity: Sequence[float],
@@ -73,7 +76,6 @@ class TwistController:
     ) -> None:
         from rcilab.model.dynamics.symmetric_solver import SymmetricSolver  # The import takes 0.1 s.
 
-        tool = model.limits.cartesian
         self._chain, self._T_flange_tool = build_chain(model.description.dh), model.T_flange_tool
         self._joints = list(zip(lower, upper, velocity, acceleration, jerk, strict=True))
         self._speeds = (TOOL_MARGIN * speed * tool.translation_velocity, TOOL_MARGIN * speed * tool.rotation_velocity)

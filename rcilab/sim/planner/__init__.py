@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from rcilab.sim.planner.planner import Planner, PlannerState
 from rcilab.sim.planner.planner_event import EventKind, PlannerEvent, PlannerStep, Refusal, RefusalReason
+from rcilab.sim.planner.planner_feed import FedStep, PlannerFeed
 from rcilab.sim.planner.target import (
     ArcTarget,
     Blend,
@@ -20,12 +21,14 @@ __all__ = [
     "ArcTarget",
     "Blend",
     "EventKind",
+    "FedStep",
     "JointSpeed",
     "JointTarget",
     "LineTarget",
     "PauseTarget",
     "Planner",
     "PlannerEvent",
+    "PlannerFeed",
     "PlannerState",
     "PlannerStep",
     "Refusal",

@@ -1,70 +1,217 @@
-"""On-line motions of the joints: to angles that may change, and to standstill."""
+"""On-line motions of the joints: to angles that may change, to standstill, and along streamed angles."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.limits import JointLimits
 from rcilab.motion import _ruckig
+from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.sim.planner.mover import MotionState
 from rcilab.sim.planner.section_bounds import joint_bounds
+from rcilab.sim.planner.stream_filter import StreamFilter, StreamMode
 from rcilab.sim.planner.target import JointSpeed
 
 _STANDSTILL = (1e-9, 1e-6)  # [rad/s], [rad/s^2] Rounding of the curve.
+_THERE = 1e-7  # [rad] ruckig reaches a goal within 1e-8.
+_FASTEST = JointSpeed()
 
 
-class JointMover:
-    """Moves to joint angles that may change at any time, or to standstill.
-
-    Attributes:
-        is_synchronized: Whether all joints arrive together.
+class StopMover:
+    """Stops every joint by itself, as fast as the limits allow.
 
     Args:
         limits: Of the joints.
         state: Where it begins.
-        is_synchronized: As the attribute.
     """
 
-    def __init__(self, limits: JointLimits, state: MotionState, *, is_synchronized: bool) -> None:
-        self.is_synchronized = is_synchronized
-        self._limits = limits
-        bounds = joint_bounds(limits, JointSpeed())
-        self._bounds: tuple[list[float], list[float]] = bounds.acceleration.tolist(), bounds.jerk.tolist()
-        self._axes = _ruckig.Stepper(*state, *self._bounds, is_synchronized=is_synchronized)
-        self._goal: list[float] | None = None
-        self._velocity = self._still = [0.0] * len(state.q)
+    def __init__(self, limits: JointLimits, state: MotionState) -> None:
+        bounds = joint_bounds(limits, _FASTEST)
+        self._axes = _ruckig.Stepper(*state, bounds.acceleration.tolist(), bounds.jerk.tolist())
+        self._still = [0.0] * len(state.q)
 
     @property
     def state(self) -> MotionState:
         """Where the joints are and how they move."""
-        axes = self._axes
-        return MotionState(list(axes.q), list(axes.dq), list(axes.ddq))
+        return _state_of(self._axes)
 
     @property
     def is_stationary(self) -> bool:
-        """Whether the arm stands at its goal, or after a stop."""
-        slow, weak = _STANDSTILL
-        axes = self._axes
-        if self._goal is not None and max(abs(a - b) for a, b in zip(axes.q, self._goal, strict=True)) > slow:
-            return False
-        return all(-slow < v < slow for v in axes.dq) and all(-weak < a < weak for a in axes.ddq)
-
-    def set_goal(self, q: Sequence[float], speed: JointSpeed) -> None:
-        """Moves to these joint angles from the next step on, n finite numbers, [rad]."""
-        bounds = joint_bounds(self._limits, speed)
-        self._goal = list(q)
-        self._velocity = bounds.velocity.tolist()
-        self._axes.set_limits(bounds.acceleration.tolist(), bounds.jerk.tolist())
-
-    def stop(self) -> None:
-        """Stops every joint as fast as the limits allow, from the next step on."""
-        self._goal = None
-        self._axes.set_limits(*self._bounds)
+        """Whether the arm stands."""
+        return _stands(self._axes)
 
     def step(self) -> list[float]:
         """Advances one cycle and returns the joint angles, n plain floats, [rad]."""
-        if self._goal is None:
+        if not self.is_stationary:
             self._axes.step_to_velocity(self._still)
-        else:
-            self._axes.step_to_positions(self._goal, self._velocity)
         return list(self._axes.q)
+
+
+class JointMover:
+    """Moves to joint angles that may change at any time; all joints arrive together.
+
+    Args:
+        limits: Of the joints.
+        state: Where it begins.
+    """
+
+    def __init__(self, limits: JointLimits, state: MotionState) -> None:
+        self._limits = limits
+        self._stop: StopMover | None = StopMover(limits, state)  # Before the curve.
+        self._curve: PiecewisePolynomial | None = None
+        self._t = 0.0
+        self._goal, self._speed = list(state.q), _FASTEST
+
+    @property
+    def state(self) -> MotionState:
+        """Where the joints are and how they move."""
+        if self._stop is not None:
+            return self._stop.state
+        assert self._curve is not None
+        q, dq, ddq, _ = self._curve.at(self._t)
+        if self._t >= self._curve.duration:
+            return MotionState(list(self._goal), [0.0] * len(dq), [0.0] * len(dq))
+        return MotionState(q.tolist(), dq.tolist(), ddq.tolist())
+
+    @property
+    def is_stationary(self) -> bool:
+        """Whether the arm stands at its goal."""
+        return self._curve is not None and self._stop is None and self._t >= self._curve.duration
+
+    def set_goal(self, q: Sequence[float], speed: JointSpeed) -> None:
+        """Moves to these joint angles from the next step on, n finite numbers, [rad].
+
+        Where a joint would leave its range on the way, all stop first.
+        """
+        state = self.state
+        self._goal, self._speed = list(q), speed
+        self._stop = None
+        self._plan(state)
+        assert self._curve is not None
+        (lowest, _), (highest, _) = self._curve.extremes()
+        limits = self._limits
+        if (lowest < np.minimum(limits.lower, state.q)).any() or (highest > np.maximum(limits.upper, state.q)).any():
+            self._stop = StopMover(limits, state)
+
+    def step(self) -> list[float]:
+        """Advances one cycle and returns the joint angles, n plain floats, [rad]."""
+        stop = self._stop
+        if stop is not None:
+            q = stop.step()
+            if stop.is_stationary:
+                self._stop = None
+                self._plan(stop.state)
+            return q
+        assert self._curve is not None
+        self._t += CYCLE_TIME
+        if self._t >= self._curve.duration:
+            return list(self._goal)
+        return self._curve.at(self._t)[0].tolist()
+
+    def _plan(self, state: MotionState) -> None:
+        bounds = joint_bounds(self._limits, self._speed)
+        q, dq, ddq = (np.array(part) for part in state)
+        limits = bounds.velocity, bounds.acceleration, bounds.jerk
+        self._curve = _ruckig.plan_profile(q, np.array(self._goal), *limits, dq, ddq)
+        self._t = 0.0
+
+
+class StreamMover:
+    """Moves every joint by itself to the newest streamed angles, smoothed, with the largest acceleration and jerk.
+
+    Attributes:
+        target: The newest angles, [rad].
+
+    Args:
+        limits: Of the joints.
+        state: Where it begins.
+    """
+
+    def __init__(self, limits: JointLimits, state: MotionState) -> None:
+        self._limits = limits
+        bounds = joint_bounds(limits, _FASTEST)
+        self._bounds: tuple[list[float], list[float]] = bounds.acceleration.tolist(), bounds.jerk.tolist()
+        self._axes = _ruckig.Stepper(*state, *self._bounds)
+        self._velocity: list[float] = bounds.velocity.tolist()
+        self._filter = StreamFilter(state.q, "direct", 0.0)
+        self.target = self._followed = list(state.q)
+        self._past: list[list[float]] = []  # The last angles, the newest first, while they are smoothed.
+
+    @property
+    def state(self) -> MotionState:
+        """Where the joints are and how they move."""
+        return _state_of(self._axes)
+
+    @property
+    def is_stationary(self) -> bool:
+        """Whether the arm stands at the newest angles."""
+        is_there = max(abs(a - b) for a, b in zip(self._axes.q, self.target, strict=True)) < _THERE
+        return is_there and self._filter.is_settled and _stands(self._axes)
+
+    def take(self, q: list[float], speed: JointSpeed, mode: StreamMode, smoothing: float) -> None:
+        """Takes the newest angles, n finite numbers, [rad].
+
+        Args:
+            q: The angles.
+            speed: Of the joints.
+            mode: How they are followed.
+            smoothing: From 0 to 1.
+        """
+        if (mode, smoothing) != (self._filter.mode, self._filter.smoothing):
+            self._filter = StreamFilter(self._axes.q, mode, smoothing)
+            q0, dq, ddq = self.state
+            self._followed = q0
+            self._past = [
+                [x - k * CYCLE_TIME * (v - 0.5 * k * CYCLE_TIME * a) for x, v, a in zip(q0, dq, ddq, strict=True)]
+                for k in range(3)
+            ]
+        self._velocity = joint_bounds(self._limits, speed).velocity.tolist()
+        self.target = q
+        self._filter.take(q)
+
+    def step(self) -> list[float]:
+        """Advances one cycle and returns the joint angles, n plain floats, [rad]."""
+        if self.is_stationary:
+            return list(self._axes.q)
+        q = self._filter.step()
+        if self._filter.mode == "direct":
+            self._axes.step_to_positions(q, self._velocity)
+            return list(self._axes.q)
+        rates = [(new - old) / CYCLE_TIME for new, old in zip(q, self._followed, strict=True)]
+        self._followed = q
+        if not self._takes(q):
+            ends = [min(max(v, -bound), bound) for v, bound in zip(rates, self._velocity, strict=True)]
+            self._axes.step_to_moving(q, ends, self._velocity)
+        q = list(self._axes.q)
+        self._past = [q, *self._past[:2]]
+        return q
+
+    def _takes(self, q: Sequence[float]) -> bool:
+        """Advances to these angles if that is inside the bounds by differences; returns whether it is.
+
+        The fastest motion to a moving place, which the planner would compute, accelerates to and fro around it.
+        """
+        h = CYCLE_TIME
+        dq: list[float] = []
+        ddq: list[float] = []
+        for x, x1, x2, x3, v_max, a_max, j_max in zip(q, *self._past, self._velocity, *self._bounds, strict=True):
+            v, a = (x - x1) / h, (x - 2.0 * x1 + x2) / h**2
+            jerk = (x - x3 - 3.0 * (x1 - x2)) / h**3
+            if not (abs(jerk) <= j_max and abs(a) <= a_max and abs(v) <= v_max):
+                return False
+            dq.append(v + 0.5 * a * h + jerk * h * h / 3.0)  # As in `derivatives_from_differences`.
+            ddq.append(a + jerk * h)
+        self._axes.set_state(q, dq, ddq)
+        return True
+
+
+def _state_of(axes: _ruckig.Stepper) -> MotionState:
+    return MotionState(list(axes.q), list(axes.dq), list(axes.ddq))
+
+
+def _stands(axes: _ruckig.Stepper) -> bool:
+    slow, weak = _STANDSTILL
+    return all(-slow < v < slow for v in axes.dq) and all(-weak < a < weak for a in axes.ddq)

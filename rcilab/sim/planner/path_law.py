@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.motion import _ruckig
 from rcilab.sim.planner.velocity_change import change_distance, fastest_after, fastest_before, slowest_after
 
-_ROUNDING = 1.0 - 1e-9  # ruckig refuses a target velocity above its bound.
+_ROUNDING = 1.0 - 1e-7  # ruckig refuses a target velocity above its bound, and solves with a tolerance.
 _SMALLEST = 1e-9  # Part of a stretch's velocity below which the law stands.
 
 
@@ -131,17 +132,18 @@ class PathLaw:
         for k in range(len(stretches) - 2, -1, -1):
             _, _, acceleration, jerk = stretches[k + 1]
             length = stretches[k + 1].end - stretches[k].end
-            reachable = fastest_before(junctions[k + 1], length, acceleration, jerk)
+            reachable = _fastest(junctions[k + 1], length, acceleration, jerk)
             junctions[k] = _ROUNDING * min(caps[k], caps[k + 1], reachable)
         v, a, s = line.ds, line.dds, line.s
         for k, (end, _, acceleration, jerk) in enumerate(stretches[:-1]):
-            length = end - s
-            if change_distance(v, a, junctions[k], acceleration, jerk) > length:
-                wanted = junctions[k]
+            wanted, length = junctions[k], (end - s) * _ROUNDING
+            if a == 0.0 and wanted > v:
+                junctions[k] = min(wanted, _fastest(v, length, acceleration, jerk))
+            elif change_distance(v, a, wanted, acceleration, jerk) > length:
                 if wanted >= v + a * abs(a) / (2.0 * jerk):
                     junctions[k] = fastest_after(v, a, length, wanted, acceleration, jerk)
                 else:  # After a change of the override: it slows down as fast as it may.
-                    junctions[k] = slowest_after(v, a, length, acceleration, jerk)
+                    junctions[k] = slowest_after(v, a, length, wanted, acceleration, jerk)
             v, a, s = junctions[k], 0.0, end
         self._junctions = junctions
         self._aim()
@@ -155,3 +157,12 @@ class PathLaw:
             return
         junction = self._junctions[0]
         self._line.aim_at(end, junction, max(self._override * velocity, junction), acceleration, jerk)
+
+
+def _fastest(w: float, length: float, acceleration: float, jerk: float) -> float:
+    """Returns the largest velocity at one end of a stretch, for a velocity at the other.
+
+    A stretch begins at the first cycle in it, up to a cycle's way behind its begin.
+    """
+    first = fastest_before(w, length, acceleration, jerk)
+    return fastest_before(w, max(0.0, length - max(first, w) * CYCLE_TIME), acceleration, jerk)

@@ -4,22 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import Enum
-from math import inf
+from math import dist, inf
 
 from rcilab.core.arrays import as_vector
 from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.core.limits import Limits
 from rcilab.core.spatial import Pose
+from rcilab.i18n.translator import Remark
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.twist import Frame
-from rcilab.sim.planner.joint_movers import JointMover
+from rcilab.sim.planner.joint_movers import JointMover, StopMover, StreamMover
 from rcilab.sim.planner.mover import MotionState, Mover
 from rcilab.sim.planner.path_motion import PathMotion
-from rcilab.sim.planner.planner_event import EventKind, PlannerEvent, PlannerStep, Refusal
+from rcilab.sim.planner.planner_event import EventKind, PlannerEvent, PlannerStep, Refusal, RefusalReason
 from rcilab.sim.planner.preparation import PlannedArm, find_outside, refusal_of
 from rcilab.sim.planner.section import PoseSolver
+from rcilab.sim.planner.stream_filter import StreamMode
 from rcilab.sim.planner.target import ArcTarget, JointSpeed, JointTarget, PauseTarget, SplineTarget, Target, ToolSpeed
+from rcilab.sim.planner.tool_mover import ToolMover
+from rcilab.sim.planner.velocity_mover import VelocityMover
 
+_FASTEST, _FASTEST_TOOL = JointSpeed(), ToolSpeed()
 _LONGEST_PAUSE = 1e6  # [s]
 _LARGEST_ANGLE = 1e4  # [rad] Of a circle with many turns.
 
@@ -62,20 +67,30 @@ class Planner:
         self._arm = PlannedArm(model, limits, PoseSolver(model), slows_down)
         self._override = 1.0
         self._pending: list[PlannerEvent] = []
-        self.reset(q)
+        self._queue = PathMotion(self._arm, q)
+        self._mover: Mover | None = None
+        self._q = list(q)
 
     def reset(self, q: Sequence[float]) -> None:
-        """Discards everything without events, for an arm that something else has moved or stopped.
+        """Discards all targets and stands at other joint angles, after something else has moved or stopped the arm.
 
         Args:
             q: Joint angles of the stationary arm, n plain floats, [rad].
         """
+        self._pending += self._queue.discard()
         self._queue = PathMotion(self._arm, q)
         self._queue.set_override(self._override)
-        self._mover: Mover | None = None
+        self._mover = None
         self._q = list(q)
-        self._is_paused = False
-        self._pending.clear()
+
+    def place(self, q: Sequence[float]) -> None:
+        """Sets where the standing arm is before a motion begins, n plain floats, [rad]; queued targets wait.
+
+        An on-line command from elsewhere is dropped.
+        """
+        if list(q) != self._q:
+            self._q, self._mover = list(q), None
+            self._queue.begin_at(q)
 
     def configure(self, model: RobotModel, limits: Limits) -> None:
         """Sets another tool, load or other limits; at standstill, without targets.
@@ -157,9 +172,7 @@ class Planner:
 
     def stop(self) -> None:
         """Stops every joint by itself, as fast as the limits allow, and discards all targets."""
-        mover = JointMover(self._arm.limits.joint, self._take_over(), is_synchronized=False)
-        mover.stop()
-        self._mover = mover
+        self._take_over(StopMover(self._arm.limits.joint, self._running_state()))
 
     def clear_queue(self) -> None:
         """Discards the targets to which the path does not lead yet; the running one continues."""
@@ -169,7 +182,7 @@ class Planner:
         """Discards the current target of the standing arm, after `pause`; those after it begin where the arm is."""
         self._pending += self._queue.skip()
 
-    def move_joints(self, q: Sequence[float], speed: JointSpeed) -> Refusal | None:
+    def move_joints(self, q: Sequence[float], speed: JointSpeed = _FASTEST) -> Refusal | None:
         """Moves to joint angles from the running state; all joints arrive together.
 
         Args:
@@ -187,12 +200,13 @@ class Planner:
         refusal = self._outside(goal)
         if refusal is None:
             mover = self._mover
-            if not isinstance(mover, JointMover) or not mover.is_synchronized:
-                mover = self._mover = JointMover(self._arm.limits.joint, self._take_over(), is_synchronized=True)
+            if not isinstance(mover, JointMover):
+                mover = JointMover(self._arm.limits.joint, self._running_state())
+                self._take_over(mover)
             mover.set_goal(goal, speed)
         return refusal
 
-    def move_tool(self, pose: Pose, speed: ToolSpeed) -> Refusal | None:
+    def move_tool(self, pose: Pose, speed: ToolSpeed = _FASTEST_TOOL) -> Refusal | None:
         """Moves the tool to a pose from the running state, on a straight line if it stands or moves along that line.
 
         Args:
@@ -201,11 +215,26 @@ class Planner:
 
         Returns:
             Why the command is refused, without effect; None: it is followed.
+
+        Raises:
+            InvalidValueError: A speed is not valid.
         """
-        raise NotImplementedError
+        _require_speed(speed, self._arm.model.n)
+        if isinstance(self._mover, ToolMover):
+            return self._mover.set_goal(pose, speed)
+        mover = ToolMover(self._arm, self._running_state())
+        refusal = mover.set_goal(pose, speed)
+        if refusal is None:
+            self._take_over(mover)
+        return refusal
 
     def set_joint_velocity(
-        self, dq: Sequence[float], *, speed: JointSpeed, is_synchronized: bool = True, duration: float | None = None
+        self,
+        dq: Sequence[float],
+        *,
+        speed: JointSpeed = _FASTEST,
+        is_synchronized: bool = True,
+        duration: float | None = None,
     ) -> None:
         """Moves the joints with constant velocities until the next command; at the end of its range a joint stops.
 
@@ -216,57 +245,160 @@ class Planner:
             duration: Time after which it stops, [s]; None: it does not.
 
         Raises:
-            InvalidValueError: dq is not n finite numbers.
+            InvalidValueError: dq is not n finite numbers, or a speed is not valid.
+            PlanningError: The arm stands outside the range of a joint.
         """
-        raise NotImplementedError
+        desired = as_vector(dq, self._arm.model.n, "dq", "rad/s").tolist()
+        _require_speed(speed, self._arm.model.n)
+        mover = self._velocity_mover()
+        mover.set_joint_velocity(desired, speed, is_synchronized=is_synchronized, duration=duration)
+        self._take_over(mover)
 
     def set_twist(
-        self, twist: Sequence[float], *, speed: ToolSpeed, frame: Frame = "base", duration: float | None = None
+        self,
+        twist: Sequence[float],
+        *,
+        speed: ToolSpeed = _FASTEST_TOOL,
+        frame: Frame = "base",
+        duration: float | None = None,
     ) -> None:
-        """Moves the tool with a constant twist until the next command.
+        """Moves the tool with a constant twist until the next command, more slowly where a joint cannot follow.
 
         Args:
             twist: Velocity of the tool tip and angular velocity, linear first, [m/s, rad/s].
             speed: Its accelerations and jerks apply; a twist above its velocities is reduced.
-            frame: Axes of the twist.
+            frame: Axes of the twist: those of the base, or the moving ones of the tool.
             duration: Time after which it stops, [s]; None: it does not.
 
         Raises:
-            InvalidValueError: The twist is not six finite numbers, or the frame is unknown.
+            InvalidValueError: The twist is not six finite numbers, the frame is unknown, or a speed is not valid.
+            PlanningError: The arm stands outside the range of a joint.
         """
-        raise NotImplementedError
+        desired = as_vector(twist, 6, "twist", "m/s, rad/s").tolist()
+        _require_speed(speed, self._arm.model.n)
+        mover = self._velocity_mover()
+        mover.set_twist(desired, speed, frame, duration)
+        self._take_over(mover)
 
     def servo_joints(self, q: Sequence[float], *, velocity: float | None = None) -> Refusal | None:
         """Moves every joint by itself to the newest angles, with the largest acceleration and jerk.
 
         Args:
             q: n finite numbers, [rad].
-            velocity: Of every joint, [rad/s]; None: the limits.
+            velocity: Of every joint, above zero, [rad/s]; None: the limits.
 
         Returns:
             Why the command is refused, without effect; None: it is followed.
 
         Raises:
-            InvalidValueError: q is not n finite numbers.
+            InvalidValueError: q is not n finite numbers, or the velocity is not valid.
         """
-        raise NotImplementedError
+        return self.follow_joints(q, velocity=velocity)
 
     def servo_tool(self, pose: Pose, *, velocity: float | None = None, max_step: float | None = None) -> Refusal | None:
         """Moves every joint by itself to the angles of the newest pose, as `servo_joints`.
 
         Args:
             pose: Pose of the tool in base.
-            velocity: Of every joint, [rad/s]; None: the limits.
-            max_step: Largest distance from the last commanded pose, [m]; None: any.
+            velocity: Of every joint, above zero, [rad/s]; None: the limits.
+            max_step: Largest distance from the last pose, [m]; None: any.
 
         Returns:
             Why the command is refused, without effect; None: it is followed.
+
+        Raises:
+            InvalidValueError: The velocity is not valid.
         """
-        raise NotImplementedError
+        return self.follow_tool(pose, velocity=velocity, max_step=max_step)
+
+    def follow_joints(
+        self,
+        q: Sequence[float],
+        *,
+        mode: StreamMode = "direct",
+        smoothing: float = 0.0,
+        velocity: float | None = None,
+    ) -> Refusal | None:
+        """Follows streamed joint angles, smoothed, as `servo_joints`.
+
+        Args:
+            q: n finite numbers, [rad].
+            mode: As they come, on a curve through them, or low-pass filtered.
+            smoothing: Of the curve or the filter, 0 to 1.
+            velocity: Of every joint, above zero, [rad/s]; None: the limits.
+
+        Returns:
+            Why the command is refused, without effect; None: it is followed.
+
+        Raises:
+            InvalidValueError: A value is not valid.
+        """
+        goal = as_vector(q, self._arm.model.n, "q", "rad").tolist()
+        speed = JointSpeed(velocity=velocity)
+        _require_speed(speed, self._arm.model.n)
+        if not 0.0 <= smoothing <= 1.0:
+            raise InvalidValueError("smoothing", smoothing, "must be from 0 to 1")
+        refusal = self._outside(goal)
+        if refusal is not None:
+            return refusal
+        mover = self._mover
+        if not isinstance(mover, StreamMover):
+            mover = StreamMover(self._arm.limits.joint, self._running_state())
+            self._take_over(mover)
+        mover.take(goal, speed, mode, smoothing)
+        return None
+
+    def follow_tool(
+        self,
+        pose: Pose,
+        *,
+        mode: StreamMode = "direct",
+        smoothing: float = 0.0,
+        velocity: float | None = None,
+        max_step: float | None = None,
+    ) -> Refusal | None:
+        """Follows streamed poses of the tool by the nearest joint angles, smoothed, as `follow_joints`.
+
+        Args:
+            pose: Pose of the tool in base.
+            mode: As for `follow_joints`.
+            smoothing: As for `follow_joints`.
+            velocity: Of every joint, above zero, [rad/s]; None: the limits.
+            max_step: Largest distance from the last pose, [m]; None: any.
+
+        Returns:
+            Why the command is refused, without effect; None: it is followed.
+
+        Raises:
+            InvalidValueError: A value is not valid.
+        """
+        mover, model = self._mover, self._arm.model
+        near = mover.target if isinstance(mover, StreamMover) else self._q
+        if max_step is not None:
+            step = dist(model.forward(near).parts[1], pose.parts[1])
+            if step > max_step:
+                remark = Remark(
+                    f"the pose is {1e3 * step:.4g} mm from the last one, more than {1e3 * max_step:.4g} mm",
+                    "target_step",
+                    value=step,
+                    bound=max_step,
+                    unit="m",
+                )
+                return Refusal(reason=RefusalReason.STEP, remark=remark, value=step, bound=max_step)
+        try:
+            goal = self._arm.solver.next_to(pose, near)
+        except KinematicsError as error:
+            return refusal_of(error, 1.0)
+        return self.follow_joints(goal, mode=mode, smoothing=smoothing, velocity=velocity)
+
+    def take_events(self) -> tuple[PlannerEvent, ...]:
+        """Returns the events since the last step, for a cycle without one."""
+        events, self._pending = self._pending, []
+        return tuple(events)
 
     def step(self) -> PlannerStep:
         """Advances one cycle."""
-        events, self._pending = self._pending, []
+        events = [*self.take_events()]
         try:
             if self._mover is not None:
                 self._q = self._mover.step()
@@ -283,12 +415,19 @@ class Planner:
             self.stop()
         return PlannerStep(self._q, tuple(events))
 
-    def _take_over(self) -> MotionState:
-        """Returns the running state, for a motion that continues from it; discards all targets."""
-        mover = self._mover
-        state = self._queue.state if mover is None else mover.state
+    def _running_state(self) -> MotionState:
+        return self._queue.state if self._mover is None else self._mover.state
+
+    def _take_over(self, mover: Mover) -> None:
+        """Moves by another mover from the next step on; all targets are discarded."""
+        self._mover = mover
         self._pending += self._queue.discard()
-        return state
+
+    def _velocity_mover(self) -> VelocityMover:
+        mover = self._mover
+        if isinstance(mover, VelocityMover):
+            return mover
+        return VelocityMover(self._arm.model, self._arm.limits, self._running_state())
 
     def _outside(self, q: Sequence[float]) -> Refusal | None:
         limits = self._arm.limits.joint

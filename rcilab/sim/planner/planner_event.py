@@ -15,6 +15,7 @@ class RefusalReason(Enum):
     UNREACHABLE = "a pose is out of reach"
     SINGULAR = "the arm would be at a singularity"
     JOINT_RANGE = "a joint would leave its range"
+    STEP = "a streamed pose is too far from the last one"
     GEOMETRY = "the poses do not give a path"
 
 
@@ -30,9 +31,9 @@ class Refusal:
     joint: int | None = None
     """Number of the joint, from 1, for JOINT_RANGE."""
     value: float | None = None
-    """Its angle there, [rad]."""
+    """Its angle there, [rad]; for STEP the distance, [m]."""
     bound: float | None = None
-    """The end of its range, [rad]."""
+    """The end of its range, [rad]; for STEP the largest distance, [m]."""
 
 
 class EventKind(Enum):

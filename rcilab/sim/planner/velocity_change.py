@@ -52,12 +52,15 @@ def fastest_after(v: float, a: float, distance: float, cap: float, a_max: float,
     return cap if low >= cap else _bisect(v, a, distance, low, cap, a_max, j_max)
 
 
-def slowest_after(v: float, a: float, distance: float, a_max: float, j_max: float) -> float:
-    """Returns the smallest constant velocity that is reached within a distance, from a moving state."""
-    if change_distance(v, a, 0.0, a_max, j_max) <= distance:
-        return 0.0
-    high = max(0.0, v + a * abs(a) / (2.0 * j_max))
-    return _bisect(v, a, distance, high, 0.0, a_max, j_max)
+def slowest_after(v: float, a: float, distance: float, least: float, a_max: float, j_max: float) -> float:
+    """Returns a constant velocity close above `least` that is reached within a distance, from a moving state.
+
+    At most the velocity at which the acceleration is zero at once.
+    """
+    if change_distance(v, a, least, a_max, j_max) <= distance:
+        return least
+    high = max(least, v + a * abs(a) / (2.0 * j_max))
+    return _bisect(v, a, distance, high, least, a_max, j_max)
 
 
 def _bisect(v: float, a: float, distance: float, inside: float, outside: float, a_max: float, j_max: float) -> float:

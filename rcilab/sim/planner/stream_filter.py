@@ -1,0 +1,94 @@
+"""Smoothing of streamed joint angles that arrive at irregular times."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Literal, TypeAlias
+
+from rcilab.core.clock import CYCLE_TIME
+
+StreamMode: TypeAlias = Literal["direct", "fit", "filter"]
+"""How streamed angles are followed: as they come; on a curve through them, one period later; or low-pass filtered."""
+
+_LONGEST_TIME = 0.1  # [s] Time constant of the filter, and length of the mean over the curve, at smoothing 1; a choice.
+_LONGEST_PERIOD = 100  # [cycles] A client that streams more slowly is not streaming.
+
+
+class StreamFilter:
+    """Turns the newest streamed angles into those to follow, cycle by cycle.
+
+    Args:
+        q: Joint angles at the start, n plain floats, [rad].
+        mode: How they are followed.
+        smoothing: From 0 to 1.
+    """
+
+    def __init__(self, q: Sequence[float], mode: StreamMode, smoothing: float) -> None:
+        self.mode: StreamMode = mode
+        self.smoothing = smoothing
+        self._target = list(q)
+        self._first = self._second = list(q)  # Of the filter's two stages.
+        time = smoothing * _LONGEST_TIME
+        self._share = CYCLE_TIME / (CYCLE_TIME + 0.5 * time)
+        window = max(1, round(time / CYCLE_TIME))
+        self._recent = deque([list(q)] * window, window)
+        self._sum = [window * x for x in q]
+        self._points = [list(q)] * 4  # Through which the curve goes; it is between the second and the third.
+        self._period, self._since = 1, 0
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether its output stays at the newest angles."""
+        if self.mode == "filter":
+            return max(abs(a - b) for a, b in zip(self._second, self._target, strict=True)) < 1e-9
+        if self.mode == "fit":
+            return self._since > 4 * self._period + len(self._recent)
+        return True
+
+    def take(self, q: Sequence[float]) -> None:
+        """Takes the newest angles, n numbers, [rad]."""
+        self._period = min(max(1, self._since), _LONGEST_PERIOD)
+        self._since = 0
+        self._target = list(q)
+        self._points = [*self._points[1:], self._target]
+
+    def step(self) -> list[float]:
+        """Returns the angles to follow in this cycle, n plain floats, [rad]."""
+        if self.mode == "direct":
+            return self._target
+        if self.mode == "filter":
+            return self._filtered()
+        return self._mean(self._on_curve())
+
+    def _filtered(self) -> list[float]:
+        """Returns the output of two low-pass stages, whose input goes from one target to the next in a period."""
+        self._since += 1
+        u = min(1.0, self._since / self._period)
+        share = self._share
+        inputs = [a + u * (b - a) for a, b in zip(*self._points[2:], strict=True)]
+        self._first = [x + share * (t - x) for x, t in zip(self._first, inputs, strict=True)]
+        self._second = [x + share * (t - x) for x, t in zip(self._second, self._first, strict=True)]
+        return self._target if self.is_settled else self._second
+
+    def _on_curve(self) -> list[float]:
+        """Returns the next point of the uniform cubic B-spline of the points."""
+        phase = self._since % self._period
+        if phase == 0 and 0 < self._since < 4 * self._period:  # No further angles: the curve ends at the last ones.
+            self._points = [*self._points[1:], self._target]
+        self._since += 1
+        u = (phase + 1) / self._period
+        left = 1.0 - u
+        a = left * left * left / 6.0
+        b = (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0
+        c = (3.0 * left * left * left - 6.0 * left * left + 4.0) / 6.0
+        d = u * u * u / 6.0
+        return [a * p + b * q + c * r + d * s for p, q, r, s in zip(*self._points, strict=True)]
+
+    def _mean(self, q: list[float]) -> list[float]:
+        oldest = self._recent[0]
+        self._recent.append(q)
+        self._sum = [total + x - y for total, x, y in zip(self._sum, q, oldest, strict=True)]
+        if self.is_settled:
+            return self._target
+        return [total / len(self._recent) for total in self._sum]
