@@ -32,7 +32,9 @@ def add_parser(subparsers: Any) -> None:
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Adds the options, for `rcilab workbench` and for a bare `rcilab`."""
     parser.add_argument("--model", default="xMatePro7", help="initial arm (default: %(default)s)")
-    parser.add_argument("--robot", default="virtual", metavar="rci://HOST:PORT", help="controller to connect to")
+    parser.add_argument(
+        "--robot", default="virtual", metavar="ADDRESS", help="controller to connect to: rci://HOST:PORT, fci://HOST"
+    )
     add_page_options(parser)
 
 

@@ -48,6 +48,7 @@ from rcilab.makers.driver import (
     require_timeout,
 )
 from rcilab.makers.maker import (
+    all_makers,
     capabilities_of,
     commanded_start,
     find_missing_feature,
@@ -56,6 +57,7 @@ from rcilab.makers.maker import (
     require_parts,
     timing_of,
 )
+from rcilab.model.dynamics.payload import POINT_MASS
 from rcilab.model.robot_model import load_model, require_model
 from rcilab.motion import Motion, plan_joint, require_motion
 from rcilab.motion.cartesian import arm_angles, follow_path, schedule
@@ -232,6 +234,8 @@ class RobotSession(Closeable):
             if name == scheme:
                 return commands
         hint = f"; it is .{scheme}.{name}" if scheme and hasattr(type(commands), name) else ""
+        if scheme and name in (maker.scheme for maker in all_makers()):
+            hint = f"; the requests of this robot's controller are in .{scheme}"
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}", name=name, obj=self)
 
     def __dir__(self) -> list[str]:
@@ -377,13 +381,13 @@ class RobotSession(Closeable):
         """Sets the tool by its pose in the flange frame; `model` includes it from then on."""
         self.configure(RobotConfiguration(tool=as_pose(T_flange_tool, "T_flange_tool")))
 
-    def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
+    def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike = POINT_MASS) -> None:
         """Sets the load at the flange; `model` includes it from then on.
 
         Args:
             mass: [kg], up to the arm's payload.
             center_of_mass: In the flange frame, shape (3,), [m].
-            inertia: About the centre of mass, shape (3, 3), [kg m^2].
+            inertia: About the centre of mass, shape (3, 3), [kg m^2]; that of a point mass, zero, by default.
         """
         require_feature(self.model, "load")
         self._commands.set_load(mass, center_of_mass, inertia)

@@ -217,6 +217,12 @@ def find_maker(name: str) -> Maker | None:
     return next((maker for maker in all_makers() if name in maker.robots), None)
 
 
+def state_rounding_of(model: RobotModel) -> float:
+    """Returns the largest rounding of commanded positions in the states of an arm, see `Maker.state_rounding`."""
+    maker = maker_of(model)
+    return 0.0 if maker is None else maker.state_rounding(model)
+
+
 def commanded_start(start: JointVector, q_c: JointVector, model: RobotModel) -> JointVector:
     """Returns where an arm is commanded: at the start of a motion, if a state differs from it by its rounding only.
 
@@ -225,9 +231,7 @@ def commanded_start(start: JointVector, q_c: JointVector, model: RobotModel) -> 
         q_c: Commanded joint angles of a state, shape (n,), [rad].
         model: The arm.
     """
-    maker = maker_of(model)
-    rounding = 0.0 if maker is None else maker.state_rounding(model)
-    is_there = len(start) == len(q_c) and float(np.abs(start - q_c).max()) <= rounding
+    is_there = len(start) == len(q_c) and float(np.abs(start - q_c).max()) <= state_rounding_of(model)
     return start if is_there else q_c
 
 

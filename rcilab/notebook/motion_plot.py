@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import ipywidgets
@@ -9,6 +10,7 @@ import numpy as np
 
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.i18n.plot_scale import plot_scale
+from rcilab.makers.maker import state_rounding_of
 from rcilab.notebook.part import Part
 from rcilab.notebook.style import block, soft, write
 from rcilab.notebook.svg_plot import Panel, draw, share_of
@@ -93,8 +95,9 @@ class MotionPlot(Part):
             planned = streamed_curves(plan.q, quantity) if is_scaled else plan_curves(plan, quantity)
             actual = None
             if run is not None and times is not None and len(times):
-                recorded = recorded_curves(run.t, run.q, run.q_c, run.dq, quantity)
-                actual = Curves(t=times, values=recorded.values)
+                rounding = state_rounding_of(self.model)
+                recorded = recorded_curves(run.t, run.q, run.q_c, run.dq, quantity, rounding=rounding)
+                actual = replace(recorded, t=times)
             frame = build_frame(planned, actual, limits, quantity, joint, _BUCKETS)
             unit = _UNITS[quantity] if joint else self.text("plot.percent")
             panels.append(Panel(title=self.text(f"plot.{quantity}"), unit=unit, frame=frame))

@@ -45,6 +45,8 @@ class Curves:
     """One column per signal, shape (N, k)."""
     q: Array | None = None
     """Of joint velocities: the angles one cycle before, on which their limits may depend, shape (N, n), [rad]."""
+    rounding: float = 0.0
+    """By which values may be beyond a limit because of the rounding of what they are computed from."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -200,7 +202,7 @@ def streamed_curves(q: JointPath, quantity: Quantity, model: RobotModel | None =
     return Curves(t=t, values=backward_differences(t, q, ORDERS[quantity]), q=before)
 
 
-def recorded_curves(t: Array, q: Array, q_c: Array, dq: Array, quantity: Quantity) -> Curves:
+def recorded_curves(t: Array, q: Array, q_c: Array, dq: Array, quantity: Quantity, *, rounding: float = 0.0) -> Curves:
     """Returns a recorded signal: measured q and dq, or ddq and jerk of the commands, as the controller computes them.
 
     Args:
@@ -209,12 +211,14 @@ def recorded_curves(t: Array, q: Array, q_c: Array, dq: Array, quantity: Quantit
         q_c: Commanded joint angles, [rad], shape (N, n).
         dq: Measured joint velocities, [rad/s], shape (N, n).
         quantity: The signal.
+        rounding: Largest rounding of the commanded angles, [rad].
     """
     if quantity == "q":
         return Curves(t=t, values=q)
     if quantity == "dq":
         return Curves(t=t, values=dq, q=_shifted(q))
-    return Curves(t=t, values=backward_differences(t, q_c, 2 if quantity == "ddq" else 3))
+    order = 2 if quantity == "ddq" else 3
+    return Curves(t=t, values=backward_differences(t, q_c, order), rounding=rounding * (2.0 / CYCLE_TIME) ** order)
 
 
 def _shifted(q: Array) -> Array:
@@ -318,7 +322,8 @@ def build_frame(
         return factor * np.stack([side[:, joint - 1] for side in bounds(curves)], axis=1)
 
     lower, upper = (factor * float(low[joint - 1]), factor * float(high[joint - 1])) if joint else (-100.0, 100.0)
-    frame = _frame(plan, actual, shown, lower, upper, buckets, last)
+    rounding = 0.0 if actual is None else actual.rounding * (factor if joint else 100.0 / float(high.min()))
+    frame = _frame(plan, actual, shown, lower, upper, buckets, last, rounding)
     if not (is_curved and joint):
         return frame
     drawn = plan if plan is not None else actual
@@ -365,6 +370,7 @@ def _frame(
     upper: float,
     buckets: int,
     last: float | None,
+    rounding: float = 0.0,
 ) -> Frame:
     edges, t = _time_axis(last_time(plan, actual) if last is None else last, buckets)
 
@@ -375,7 +381,8 @@ def _frame(
 
     planned, recorded = thin(plan), thin(actual)
     curves = np.array((*planned, *recorded)).reshape(-1, len(t))
-    outside = ((curves > upper) | (curves < lower)).any(axis=0)
+    slack = np.repeat((0.0, rounding), (len(planned), len(recorded)))[:, None]
+    outside = ((curves > upper + slack) | (curves < lower - slack)).any(axis=0)
     violated = np.convolve(outside, np.ones(2 * _WIDENED + 1), mode="same") > 0.5
     farthest = float(np.nanmax(np.abs(curves), initial=0.0))
     bounds = [abs(bound) for bound in (upper, lower) if np.isfinite(bound)]

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from rcilab.conformance.check import check
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.makers.maker import state_rounding_of
 from rcilab.makers.rokae.conditions import RCI_JOINT_CONDITIONS
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint, plan_recovery
@@ -67,6 +68,15 @@ def test_a_violation_is_marked_where_it_is_and_nothing_else_is():
     worst = int(np.nanargmax(np.max(spoiled.plan, axis=0)))
     assert spoiled.violated[worst]
     assert 3 <= spoiled.violated.sum() <= 12
+
+
+@pytest.mark.parametrize(("roundings", "is_violated"), [(3, False), (5, True)])
+def test_what_only_the_rounding_of_states_puts_beyond_a_limit_is_no_violation(roundings, is_violated):
+    rounding, q = state_rounding_of(FR3), np.zeros((800, 7))
+    q[500:, 1] = CYCLE_TIME**2 * LIMITS.acceleration[1] + roundings * rounding
+    run = recorded_curves(CYCLE_TIME * np.arange(800), q, q, 0.0 * q, "ddq", rounding=rounding)
+    for joint in (0, 2):
+        assert build_frame(None, run, LIMITS, "ddq", joint).violated.any() == is_violated
 
 
 def near_the_end() -> Motion:

@@ -11,6 +11,8 @@ from rcilab.core.arrays import Matrix, Vector3, as_number, as_vector, readonly_c
 from rcilab.core.errors import InvalidValueError
 
 _MAX_DISTANCE = 2.0  # [m] From the flange, as the controllers have it; a value in millimetres is above it.
+POINT_MASS = readonly_copy(np.zeros((3, 3)))
+"""Inertia of a point mass about itself, [kg m^2]."""
 LARGEST_INERTIA = 100.0  # [kg m^2] Tuning value: a hundred times that of any load of an xMate.
 
 

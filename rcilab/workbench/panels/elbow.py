@@ -18,6 +18,7 @@ from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
+    from rcilab.model.robot_model import RobotModel
 
 _NARROW = math.radians(5.0)  # [rad] A tuning value: a narrower range hardly lets the elbow move.
 _HEIGHT = {"free": 10, "other": 4}  # Of 14; forbidden arcs have the height of their hatching.
@@ -39,8 +40,9 @@ class ElbowPanel:
         with gui.add_folder(text("target.psi_title")):
             gui.add_html('<i class="rl-rows"></i>')
             factor, _ = text.units.from_si("rad")
-            end, step = (180.0, 1.0) if text.units.angle == "deg" else (3.14, 0.01)
-            slider = gui.add_slider("ψ", -end, end, step, 0.0, hint=text("target.psi_hint"))
+            step = 1.0 if text.units.angle == "deg" else 0.01
+            lowest, highest = (step * int(factor * end / step) for end in _ends(state.model))
+            slider = gui.add_slider("ψ", lowest, highest, step, 0.0, hint=text("target.psi_hint"))
             self._psi = BoundControl(slider, ask, lambda v, p: SetArmAngle(page=p, psi=v / factor))
             self._field = NumberField(gui.add_text("", ""), ask, "psi", text.unit("deg"))
             self._ring = Html(gui)
@@ -66,6 +68,12 @@ class ElbowPanel:
                 f'<p class="rl-verdict rl-warn" role="status"><b>▲</b> {esc(self._text.render(goal.snapped))}</p>'
             )
         self._sentence.show(sentence)
+
+
+def _ends(model: RobotModel) -> tuple[float, float]:
+    """Returns the smallest and the largest arm angle, [rad]."""
+    joint, limits = model.redundancy.joint, model.limits.joint
+    return (-math.pi, math.pi) if joint is None else (float(limits.lower[joint - 1]), float(limits.upper[joint - 1]))
 
 
 def no_ring_html(redundancy: Redundancy, text: Text) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
@@ -13,6 +14,7 @@ from rcilab.app.text import Text
 from rcilab.app.view_actions import PLOTS, has_plot
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.i18n.plot_scale import ERRORS, PlotScale, plot_scale
+from rcilab.makers.maker import state_rounding_of
 from rcilab.views.plot_ticks import axis_ticks
 from rcilab.views.plots import (
     Curves,
@@ -191,7 +193,10 @@ class Plots:
         if recording is not None and name == "tau":
             actual = None if recording.tau is None else Curves(t=_times(recording), values=recording.tau)
         elif recording is not None:
-            actual = recorded_curves(_times(recording), recording.q, recording.q_c, recording.dq, name)
+            rounding = state_rounding_of(state.model)
+            actual = recorded_curves(
+                _times(recording), recording.q, recording.q_c, recording.dq, name, rounding=rounding
+            )
             if name in ("ddq", "jerk"):
                 actual = _commanded_part(actual, state)
         model = plan.model if plan is not None and plan.is_recorded else state.model  # With the limits of its time.
@@ -246,7 +251,7 @@ def _commanded_part(actual: Curves, state: UiState) -> Curves:
     if plan is None or not plan.is_recorded or (recording is not None and recording.moment is not None):
         return actual
     count = int(np.searchsorted(actual.t, plan.motion.duration + CYCLE_TIME / 2.0))
-    return Curves(t=actual.t[:count], values=actual.values[:count])
+    return replace(actual, t=actual.t[:count], values=actual.values[:count])
 
 
 def _last(state: UiState) -> float:

@@ -131,6 +131,11 @@ class FciController:
         return self.arm.playout
 
     @property
+    def motion(self) -> MotionKind | None:
+        """The motion in progress."""
+        return self._motion
+
+    @property
     def limit_table(self) -> str:
         """Whose limits of the tool's motion apply, from the next motion on: "sdk" or "manual"."""
         return self._limit_table

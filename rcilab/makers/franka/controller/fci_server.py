@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import DecodeError, ModelError
 from rcilab.makers.franka.bounds import CLIENT_PORT
 from rcilab.makers.franka.controller.fci_controller import FciController
@@ -253,9 +254,11 @@ class FciServer:
             self._link.log("refused", text, request=name, status=status.name)
 
     def _log_phase(self, before: Phase, after: Phase) -> None:
-        playout = self.controller.playout
-        if after is Phase.MOVING:
-            self._link.log("motion_started", "motion started")
+        playout, motion = self.controller.playout, self.controller.motion
+        if after is Phase.MOVING and motion is not None:
+            text = f"motion started: {motion.generator.name} under {motion.controller.name}".lower().replace("_", " ")
+            self._link.log("motion_started", text, generator=motion.generator.name, controller=motion.controller.name)
         elif before is Phase.MOVING:
-            text = f"motion ended after {playout.cycles} cycles: {playout.lost} commands lost, {playout.late} late"
+            figures = f"{playout.cycles} cycles, {playout.lost} commands lost, {playout.late} late"
+            text = f"motion ended after {CYCLE_TIME * playout.span:.3f} s: {figures}"
             self._link.log("motion_ended", text, cycles=playout.cycles, lost=playout.lost, late=playout.late)

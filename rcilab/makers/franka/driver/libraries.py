@@ -14,6 +14,8 @@ from rcilab.core.optional_deps import require_library
 _LIBRARIES = {5: ("panda_py.libfranka", "Panda"), 10: ("pylibfranka", "FR3")}
 _NO_WHEEL = (3, 13)
 """First version of Python without a pylibfranka."""
+_LARGEST_VERSION = 255
+"""The controllers have had ten versions; two letters of another protocol are a larger number."""
 
 
 def arm_of(version: int, address: object) -> str:
@@ -22,6 +24,8 @@ def arm_of(version: int, address: object) -> str:
     Raises:
         ModelError: No arm of rcilab has this version.
     """
+    if version > _LARGEST_VERSION:
+        raise ModelError(f"what answers at {address} is not Franka's interface; check the address")
     if version not in _LIBRARIES:
         raise ModelError(
             f"the controller at {address} has version {version} of Franka's interface; rcilab drives "

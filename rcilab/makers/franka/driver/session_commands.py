@@ -15,7 +15,7 @@ from rcilab.makers.driver import ConfiguredArm, RequestLock
 from rcilab.makers.franka.driver.client import FciClient
 from rcilab.makers.franka.driver.configuration import send_configuration
 from rcilab.makers.franka.driver.settings import FciSettings, as_load
-from rcilab.model.dynamics.payload import combine_payloads
+from rcilab.model.dynamics.payload import POINT_MASS, combine_payloads
 
 
 class FciSessionCommands(FciSettings):
@@ -50,13 +50,13 @@ class FciSessionCommands(FciSettings):
             super().set_ee(NE_T_EE)
             self._arm.model = self._arm.model.with_tool(self.tool)
 
-    def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
+    def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike = POINT_MASS) -> None:
         """Sets the load, in addition to the end effector; the session's `model` has both from then on.
 
         Args:
             mass: [kg].
             center_of_mass: In the flange frame, shape (3,), [m].
-            inertia: About the centre of mass, shape (3, 3), [kg m^2].
+            inertia: About the centre of mass, shape (3, 3), [kg m^2]; zero by default.
         """
         with self._lock.acquire("setLoad"):
             load = as_load(mass, center_of_mass, inertia)

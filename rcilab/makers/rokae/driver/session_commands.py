@@ -18,7 +18,7 @@ from rcilab.makers.rokae.driver.loaded_arm import LoadedArm, build_loaded_arm
 from rcilab.makers.rokae.driver.settings import load_center
 from rcilab.makers.rokae.wire import Request, SetMotorPower
 from rcilab.makers.rokae.wire.statuses import WHILE_MOVING
-from rcilab.model.dynamics.payload import Payload
+from rcilab.model.dynamics.payload import POINT_MASS, Payload
 from rcilab.robots import RobotDescription, describe_robot
 
 
@@ -91,13 +91,13 @@ class RciSessionCommands(RciCommands):
             super().set_joint_limit(lower, upper)
             self._arm.model = self._arm.model.with_joint_limits(lower, upper)
 
-    def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
+    def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike = POINT_MASS) -> None:
         """Sets the load at the flange; the session's `model` has it from then on.
 
         Args:
             mass: [kg], up to the arm's payload.
             center_of_mass: In the flange frame, shape (3,), [m].
-            inertia: About the centre of mass, shape (3, 3), [kg m^2].
+            inertia: About the centre of mass, shape (3, 3), [kg m^2]; zero by default.
         """
         with self._lock.acquire("SetLoad"):
             center = load_center(center_of_mass)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import socket
 import struct
 from collections.abc import Callable, Iterator
@@ -143,6 +144,9 @@ def test_a_client_that_is_killed_in_a_motion_stops_the_arm_and_the_next_one_move
     good_client_works(place)
     (line,) = place.log("client_lost")
     assert line.endswith("during a motion: the arm stops")
+    kind = {wire.JOINT_POSITION: "joint position", wire.JOINT_VELOCITY: "joint velocity"}[generator]
+    assert place.log("motion_started")[0] == f"motion started: {kind} under joint impedance"
+    assert re.match(r"motion ended after 0\.\d+ s: \d+ cycles, 0 commands lost, 0 late$", place.log("motion_ended")[0])
 
 
 def test_a_client_that_leaves_between_move_and_its_first_command_blocks_nobody(place: FciArena) -> None:

@@ -108,7 +108,14 @@ def test_what_answers_there_and_is_no_controller_is_not_waited_for(monkeypatch, 
         thread.join()
 
 
-def test_an_unknown_version_is_named(monkeypatch):
+@pytest.mark.parametrize(
+    ("version", "sentence"),
+    [
+        (7, r"version 7 of Franka's interface; rcilab drives version 5 \(Panda\) and"),
+        (0x6142, r"what answers at fci://127.0.0.1:\d+ is not Franka's interface"),
+    ],
+)
+def test_an_unknown_version_is_named(monkeypatch, version, sentence):
     with socket.create_server(("127.0.0.1", 0)) as listener:
         monkeypatch.setattr(FciAddress, "port", listener.getsockname()[1])
 
@@ -116,11 +123,11 @@ def test_an_unknown_version_is_named(monkeypatch):
             peer, _ = listener.accept()
             with peer:
                 peer.recv(64)
-                peer.sendall(struct.pack("<IIIBH", 0, 0, 15, 1, 7))
+                peer.sendall(struct.pack("<IIIBH", 0, 0, 15, 1, version))
 
         thread = threading.Thread(target=serve)
         thread.start()
-        with pytest.raises(ModelError, match=r"version 7 of Franka's interface; rcilab drives version 5 \(Panda\) and"):
+        with pytest.raises(ModelError, match=sentence):
             connect("fci://127.0.0.1")
         thread.join()
 

@@ -50,7 +50,11 @@ def test_the_load_is_that_of_the_state_and_of_the_model(robot):
     expected = robot.model.torque(robot.state.q).gravity
     assert robot.state.tau == pytest.approx(expected, abs=0.01)
     with pytest.raises(InvalidValueError, match="mass"):
-        robot.set_load(30.0, np.zeros(3), np.zeros((3, 3)))
+        robot.set_load(30.0, np.zeros(3))
+    robot.set_load(0.5, [0.0, 0.0, 0.05])
+    assert not robot.fci.load.inertia.any()
+    with pytest.raises(AttributeError, match=r"the requests of this robot's controller are in \.fci"):
+        robot.rci  # noqa: B018
 
 
 def test_parameters_are_taken_and_bounds_named(robot):
