@@ -34,7 +34,6 @@ from rcilab.makers.franka.controller.phases import (
 )
 from rcilab.makers.franka.controller.pose_deviation import PoseDeviations, find_deviation
 from rcilab.makers.franka.controller.reporter import StateReporter
-from rcilab.sim.self_collision import SelfCollisionWatch
 from rcilab.makers.franka.controller.settings import Settings, apply_request, apply_setup
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.limit_tables import DEFAULT_TABLE, cartesian_limits, require_table
@@ -51,6 +50,7 @@ from rcilab.sim.generators import CommandKind
 from rcilab.sim.generators.start import StartTolerance
 from rcilab.sim.hand_guiding import GuidedFreedom
 from rcilab.sim.jitter_buffer import JitterBuffer
+from rcilab.sim.self_collision import SelfCollisionWatch
 from rcilab.sim.violations import Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 

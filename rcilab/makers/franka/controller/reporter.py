@@ -154,8 +154,8 @@ class StateReporter:
         return any(present.joint_collision), any(present.cartesian_collision)
 
     @property
-    def accelerometers(self) -> NDArray[np.float64]:
-        """Readings of the acceleration sensors, top then bottom, 6 joints with 3 axes each, shape (36,), [m/s^2]."""
+    def accelerometers(self) -> tuple[float, ...]:
+        """Readings of the acceleration sensors, top then bottom, 6 joints with 3 axes each, 36 numbers, [m/s^2]."""
         x, y, z = 0.0, 0.0, GRAVITY
         readings: list[float] = []
         for q, (c, s) in zip(self._q.tolist(), _TWISTS, strict=False):
@@ -163,7 +163,7 @@ class StateReporter:
             c, s = cos(q), sin(q)
             x, y = c * x + s * y, c * y - s * x
             readings += (x, y, z)
-        return np.array(readings * 2)
+        return (*readings, *readings)
 
     def describe_collisions(self) -> Iterator[Remark]:
         """Yields each external torque and force of the last state that is above its upper threshold."""
@@ -216,7 +216,7 @@ class StateReporter:
 
     def _at_stiffness_frame(self, T_base_tool: Pose, wrench: Array) -> tuple[Array, Array]:
         """Returns a wrench on the end effector (base axes, its origin) at the origin of K, in base and in K axes."""
-        if not wrench.any():
+        if not any(wrench.tolist()):
             return self._zeros6, self._zeros6
         T_base_K = T_base_tool @ self._lever
         at_K = wrench_at(wrench, T_base_tool.parts[1], T_base_K.parts[1])

@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.core.arrays import readonly_copy
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.wire.versions import FciVersion
 
@@ -71,8 +70,9 @@ ACCELEROMETERS = 36
 _ID = Struct("<Q")
 _DOUBLES = Struct("<BB41s41sBd")
 _FLOATS = Struct("<BB41s41sBf")
+_READINGS = Struct(f"<{ACCELEROMETERS}f")
 NO_ERRORS = bytes(len(FrankaError))
-NO_READINGS = readonly_copy(np.zeros(ACCELEROMETERS))
+NO_READINGS = (0.0,) * ACCELEROMETERS
 
 
 class StatePacket(NamedTuple):
@@ -82,8 +82,8 @@ class StatePacket(NamedTuple):
     """Number of the state, which is the client's clock, [ms]."""
     numbers: NDArray[np.float64]
     """See `FIELDS`, shape (284,)."""
-    accelerometers: NDArray[np.float64]
-    """Shape (36,), [m/s^2]."""
+    accelerometers: tuple[float, ...]
+    """36 numbers, [m/s^2]."""
     motion_generator_mode: int
     """0 without one, 1 joint position, 2 joint velocity, 3 Cartesian position, 4 Cartesian velocity, 5 none."""
     controller_mode: int
@@ -101,8 +101,8 @@ class StatePacket(NamedTuple):
 def encode_state(packet: StatePacket, version: FciVersion) -> bytes:
     """Returns the datagram of a state."""
     if version.has_floats:
-        numbers = np.concatenate((packet.numbers, packet.accelerometers)).astype("<f4").tobytes()
-        return b"".join((_ID.pack(packet.message_id), numbers, _FLOATS.pack(*packet[3:])))
+        numbers, readings = packet.numbers.astype("<f4").tobytes(), _READINGS.pack(*packet.accelerometers)
+        return b"".join((_ID.pack(packet.message_id), numbers, readings, _FLOATS.pack(*packet[3:])))
     return b"".join((_ID.pack(packet.message_id), packet.numbers.tobytes(), _DOUBLES.pack(*packet[3:])))
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from rcilab.core.arrays import readonly_copy
 from rcilab.makers.franka.controller.fci_controller import FciController
 from rcilab.makers.franka.wire.requests import SetLoad
@@ -34,4 +32,4 @@ def test_a_state_after_a_setter_has_its_values_and_the_readings_of_the_last_cycl
     after = controller.packet
     assert status is Status.SUCCESS
     assert after.numbers[SLICES["m_load"]] == 1.0
-    assert np.array_equal(after.accelerometers, before)
+    assert after.accelerometers == before

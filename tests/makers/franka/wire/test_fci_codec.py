@@ -72,7 +72,7 @@ OFFSETS = {  # Offset of each field in version 10 and in version 5, [bytes].
 PACKET = StatePacket(
     message_id=0x0102030405060708,
     numbers=np.arange(NUMBERS, dtype=np.float64) + 0.5,
-    accelerometers=np.arange(ACCELEROMETERS, dtype=np.float64) - 9.0,
+    accelerometers=tuple(float(k) - 9.0 for k in range(ACCELEROMETERS)),
     motion_generator_mode=3,
     controller_mode=2,
     errors=flags_of((FrankaError.JOINT_VELOCITY_VIOLATION, FrankaError.BASE_ACCELERATION_INVALID_READING)),
@@ -108,8 +108,8 @@ def test_modes_errors_and_success_rate_follow_the_numbers(version: FciVersion) -
 
 def test_version_10_has_the_acceleration_sensors_of_both_sides() -> None:
     data = encode_state(PACKET, VERSION_10)
-    assert struct.unpack_from("<18f", data, 1144) == tuple(PACKET.accelerometers[:18])
-    assert struct.unpack_from("<18f", data, 1216) == tuple(PACKET.accelerometers[18:])
+    assert struct.unpack_from("<18f", data, 1144) == PACKET.accelerometers[:18]
+    assert struct.unpack_from("<18f", data, 1216) == PACKET.accelerometers[18:]
 
 
 @BOTH
