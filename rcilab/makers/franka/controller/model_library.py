@@ -32,6 +32,8 @@ _OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPI
 _COMPILE_TIMEOUT = 60.0  # [s]
 _ARCHITECTURES = {"x86_64": 0, "amd64": 0, "i386": 1, "i686": 1, "armv7l": 2, "aarch64": 3, "arm64": 3}
 _LINUX = 0
+_ELF = b"\x7fELF"
+"""Beginning of a library; a file of the cache without it was not written to its end."""
 
 
 def build_model_library(description: RobotDescription, cache: Path | None = None) -> bytes:
@@ -52,9 +54,12 @@ def build_model_library(description: RobotDescription, cache: Path | None = None
     key = hashlib.sha256("\0".join((platform.machine(), *_OPTIONS, source)).encode()).hexdigest()
     file = folder / f"franka-model-{key[:32]}.so"
     try:
-        return file.read_bytes()
+        library = file.read_bytes()
     except OSError:
-        library = _compile(source)
+        library = b""
+    if library.startswith(_ELF):
+        return library
+    library = _compile(source)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with replacing(file) as stream:
@@ -103,19 +108,21 @@ def _compile(source: str) -> bytes:
             f"the model library of version 5 needs a C compiler ({', '.join(COMPILERS)}), and none is installed; "
             "install one, on Debian or Ubuntu: apt install gcc libc6-dev"
         )
-    with tempfile.TemporaryDirectory(prefix="rcilab-") as folder:
-        file = Path(folder) / "model.so"
-        command = [compiler, *_OPTIONS, "-x", "c", "-", "-o", str(file), "-lm"]
-        try:
+    try:
+        with tempfile.TemporaryDirectory(prefix="rcilab-") as folder:
+            file = Path(folder) / "model.so"
+            command = [compiler, *_OPTIONS, "-x", "c", "-", "-o", str(file), "-lm"]
             done = subprocess.run(
-                command, input=source, capture_output=True, text=True, timeout=_COMPILE_TIMEOUT, check=False
+                command, input=source.encode(), capture_output=True, timeout=_COMPILE_TIMEOUT, check=False
             )
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise ModelError(f"the model library of version 5 was not compiled: {error}") from error
-        if done.returncode:
-            first = next(iter(done.stderr.strip().splitlines()), "no message")
-            raise ModelError(f"the model library of version 5 was not compiled by {compiler}: {first}")
-        return file.read_bytes()
+            library = file.read_bytes() if file.exists() else b""
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise ModelError(f"the model library of version 5 was not compiled: {error}") from error
+    if done.returncode or not library.startswith(_ELF):
+        lines = done.stderr.decode(errors="replace").strip().splitlines()
+        first = next(iter(lines), "no message, and no library")
+        raise ModelError(f"the model library of version 5 was not compiled by {compiler}: {first}")
+    return library
 
 
 def _cache_folder() -> Path:

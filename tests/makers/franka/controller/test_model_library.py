@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import shutil
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -159,6 +160,46 @@ def test_a_compiler_that_fails_is_named_with_its_message(tmp_path: Path, monkeyp
     monkeypatch.setattr(model_library, "library_source", lambda description: "int broken(")
     with pytest.raises(ModelError, match=r"was not compiled by .*: .*error"):
         build_model_library(MODEL.description, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("script", "message"),
+    [
+        ("exit 0", "no message, and no library"),
+        ("exit 1", "no message, and no library"),
+        (r"printf '\377\376 bad' >&2; exit 1", "\ufffd\ufffd bad"),
+        (
+            'for word; do test "$last" = -o && echo text > "$word"; last=$word; done; exit 0',
+            "no message, and no library",
+        ),
+    ],
+)
+def test_a_compiler_that_writes_no_library_or_no_text_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, message: str
+) -> None:
+    compiler = tmp_path / "cc"
+    compiler.write_text(f"#!/bin/sh\n{script}\n")
+    compiler.chmod(0o755)
+    monkeypatch.setattr(shutil, "which", lambda name: str(compiler))
+    with pytest.raises(ModelError, match=f"was not compiled by .*/cc: {message}$"):
+        build_model_library(MODEL.description, tmp_path / "cache")
+
+
+def test_without_a_folder_for_temporary_files_it_is_not_compiled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
+    with pytest.raises(ModelError, match=r"was not compiled: .*missing"):
+        build_model_library(MODEL.description, tmp_path)
+
+
+@pytest.mark.parametrize("content", [b"", b"\x7fEL", b"no library"])
+def test_a_damaged_library_in_the_cache_is_compiled_anew(tmp_path: Path, content: bytes) -> None:
+    first = build_model_library(MODEL.description, tmp_path)
+    (file,) = tmp_path.glob("*.so")
+    file.write_bytes(content)
+    assert build_model_library(MODEL.description, tmp_path)[:4] == b"\x7fELF"
+    assert len(file.read_bytes()) == len(first)
 
 
 def test_the_source_has_the_tables_of_the_arm() -> None:
