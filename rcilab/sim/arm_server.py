@@ -525,7 +525,8 @@ class ArmServer:
                 case DatagramArrived(datagram):
                     self.bad_datagrams += not self._server.receive_datagram(datagram)
                 case FrameArrived(peer, frame):
-                    self._server.receive(peer, frame)
+                    if not self._network.has_dropped(peer):
+                        self._server.receive(peer, frame)
                 case ClientConnected(peer):
                     self._server.connect(peer)  # First: it sends a state, for which the client may wait only briefly.
                     self._log.write("connected", f"client {peer.address} connected", client=peer.address)

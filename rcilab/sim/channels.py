@@ -50,8 +50,8 @@ class TcpChannel:
     """Returns the framer of a new connection."""
     max_clients: int = 1
     """Largest number of simultaneous clients; further ones are refused."""
-    option: str = "--port"
-    """Command line option that changes the port, for an error message."""
+    option: str | None = "--port"
+    """Command line option that changes the port, for an error message; None: its clients insist on it."""
     socket_path: Path | None = None
     """Unix-domain socket that clients on this machine try before the port; it is opened if the user may not open a port
     of the controller."""
@@ -63,8 +63,8 @@ class UdpChannel:
 
     A client of another channel can receive datagrams from it, at a port of its own (`ClientLink.direct_datagrams`).
 
-    Only datagrams from the client's address (or the configured one) and its state port are accepted. If the client
-    sends from another port, the port of its first datagram is accepted until one arrives from the state port. Others
+    Only datagrams from the client's address (or the configured one) and its state port are accepted. If the client may
+    send from another port, the port of its first datagram is accepted until one arrives from the state port. Others
     are unknown senders: they are ignored and counted.
     """
 
@@ -75,6 +75,8 @@ class UdpChannel:
     target_port: int | None = None
     """The client's port for states; None: the number of the main channel; 0: unknown until
     `ClientLink.direct_datagrams`."""
+    is_state_port_only: bool = False
+    """Whether clients send from their state port in any case."""
     option: str = "--udp-port"
     """Command line option that changes the port, for an error message."""
 

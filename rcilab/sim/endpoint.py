@@ -72,6 +72,7 @@ class Endpoint:
         udp = next((channel for channel in channels if isinstance(channel, UdpChannel)), None)
         self._own_port = self.port if udp is None or udp.target_port is None else udp.target_port
         self._state_port = self._own_port
+        self._is_state_port_only = udp is not None and udp.is_state_port_only
         self._fixed_target: tuple[str, int] | None = None
         if client is not None:
             self._fixed_target = (_resolve(client[0]), self._own_port if client[1] is None else client[1])
@@ -315,7 +316,8 @@ class Endpoint:
     def _accepts(self, sender: tuple[str, int]) -> bool:
         """Returns whether a sender other than the last one is the client; others are counted, the first is reported."""
         client = "" if self._owner is None else self._owner.address
-        if sender[0] in (client, self.fixed_host) and (self._sender is None or sender[1] == self._state_port):
+        may_be_other = self._sender is None and not self._is_state_port_only
+        if sender[0] in (client, self.fixed_host) and (may_be_other or sender[1] == self._state_port):
             self._sender = sender
             self._separate_client()
             return True
@@ -422,14 +424,20 @@ def _open_once(
                 sock = _bind(socket.SOCK_DGRAM, address, channel.port, channel.option)
             sockets.append(sock)
             datagrams = (sock, channel)
-    for listener in listeners:
-        listener.listen(_BACKLOG)
+    for listener, channel in listeners.items():
+        try:
+            listener.listen(_BACKLOG)
+        except OSError as error:  # Another one listens since.
+            problem = _explain(error, socket.SOCK_STREAM, address, channel.port, channel.option)
+            raise UsageError(problem) from error
     for sock in sockets:
         sock.setblocking(False)
     return listeners, datagrams
 
 
-def _bind(kind: socket.SocketKind, address: str, port: int, option: str, *, shared: bool = True) -> socket.socket:
+def _bind(
+    kind: socket.SocketKind, address: str, port: int, option: str | None, *, shared: bool = True
+) -> socket.socket:
     sock = socket.socket(socket.AF_INET, kind)
     # On UDP so that the vendor's client, which binds the same port on every address, can run on this machine, too.
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, int(shared))
@@ -475,10 +483,15 @@ def _describe_socket(channel: TcpChannel) -> str:
     )
 
 
-def _explain(error: OSError, kind: socket.SocketKind, address: str, port: int, option: str) -> str:
+def _explain(error: OSError, kind: socket.SocketKind, address: str, port: int, option: str | None) -> str:
     name = "TCP" if kind is socket.SOCK_STREAM else "UDP"
     if error.errno == errno.EADDRINUSE:
         others = "controller" if kind is socket.SOCK_STREAM else "controller, or the client that took every address,"
+        if option is None:
+            return (
+                f"{name} port {port} on {address}, on which clients insist, is in use; stop the other {others} there, "
+                "or choose another address with --host, such as 127.0.0.3"
+            )
         return (
             f"{name} port {port} on {address} is in use; stop the other {others} there, or choose another port "
             f"with {option} N (0 takes any free one)"

@@ -47,7 +47,7 @@ class FaultyNetwork:
         self._states = DelayedDatagrams(states, "states")
         self._tcp_faults = states
         self._answers: dict[Peer, SlowStream] = {}  # Clients with delayed responses.
-        self._drop_reasons: dict[Peer, str] = {}  # Connections to end after their last response.
+        self._drop_reasons: dict[Peer, str] = {}  # Connections that end, after their last response.
         self.has_lost = False
 
     @property
@@ -69,7 +69,10 @@ class FaultyNetwork:
     def poll(self, timeout: float, extra_sockets: Sequence[socket.socket] = ()) -> list[Arrival]:
         """Returns the arrivals that passed the network; see `Endpoint.poll`. Delayed data is sent meanwhile."""
         if self.is_clean:
-            return self._endpoint.poll(timeout, extra_sockets)
+            arrivals = self._endpoint.poll(timeout, extra_sockets)
+            if self._drop_reasons:
+                self._forget_disconnected(arrivals)
+            return arrivals
         deadline = self._clock.now() + timeout
         had_lost = self.has_lost
         while True:
@@ -107,12 +110,16 @@ class FaultyNetwork:
 
     def drop(self, peer: Peer, reason: str) -> None:
         """Ends a connection after its last response; the next `poll` reports it."""
+        self._drop_reasons[peer] = reason
         if self._is_tcp_clean:
             self._endpoint.drop(peer, reason)
         else:
             self._answers_to(peer)
-            self._drop_reasons[peer] = reason
             self._send_due()
+
+    def has_dropped(self, peer: Peer) -> bool:
+        """Returns whether a connection was ended by `drop`: frames that have arrived with its last one are void."""
+        return peer in self._drop_reasons
 
     @property
     def is_clean(self) -> bool:
@@ -141,21 +148,22 @@ class FaultyNetwork:
             if stream.is_broken:
                 self._endpoint.drop(peer, "lost its connection: a network fault")
             elif peer in self._drop_reasons and stream.next_due == float("inf"):
-                self._endpoint.drop(peer, self._drop_reasons.pop(peer))
+                self._endpoint.drop(peer, self._drop_reasons[peer])
 
     def _pass_through(self, arrivals: list[Arrival]) -> list[Arrival]:
         """Returns the arrivals without datagrams that are delayed, and with delayed ones that are due."""
         now = self._clock.now()
+        self._forget_disconnected(arrivals)
         passed: list[Arrival] = []
         for arrival in arrivals:
             if isinstance(arrival, DatagramArrived):
                 self.has_lost |= not self._commands.put(arrival.datagram, now)
                 continue
-            if isinstance(arrival, ClientDisconnected):
-                self._forget(arrival.peer)
             passed.append(arrival)
         return [*map(DatagramArrived, self._commands.take(now)), *passed]
 
-    def _forget(self, peer: Peer) -> None:
-        self._answers.pop(peer, None)
-        self._drop_reasons.pop(peer, None)
+    def _forget_disconnected(self, arrivals: list[Arrival]) -> None:
+        for arrival in arrivals:
+            if isinstance(arrival, ClientDisconnected):
+                self._answers.pop(arrival.peer, None)
+                self._drop_reasons.pop(arrival.peer, None)

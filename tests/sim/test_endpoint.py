@@ -190,3 +190,20 @@ def test_with_a_free_port_no_unix_socket_is_opened(tmp_path: Path) -> None:
 def test_a_port_that_needs_privileges_has_two_ways_on(denied: None) -> None:
     with pytest.raises(UsageError, match="above 1023 with --port N, start as root, or allow the port"):
         Endpoint("127.0.0.3", [TcpChannel(protocol="arm", port=502)])
+
+
+def test_a_port_that_another_listens_on_since_is_one_sentence() -> None:
+    endpoint = Endpoint("127.0.0.4", [ARM])
+    port = endpoint.port
+    endpoint.close()
+    with pytest.raises(UsageError, match=rf"TCP port {port} on 127.0.0.4 is in use; stop .* with --port N"):
+        Endpoint("127.0.0.4", [replace(ARM, port=port), replace(GRIPPER, port=port)])
+    Endpoint("127.0.0.4", [replace(ARM, port=port)]).close()
+
+
+def test_a_port_on_which_clients_insist_needs_another_address() -> None:
+    gripper = replace(GRIPPER, option=None)
+    first = Endpoint("127.0.0.4", [gripper])
+    with pytest.raises(UsageError, match=r"on which clients insist, is in use; .* another address with --host"):
+        Endpoint("127.0.0.4", [ARM, replace(gripper, port=first.port)])
+    first.close()

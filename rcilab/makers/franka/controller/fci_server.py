@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.errors import DecodeError, ModelError
+from rcilab.core.errors import DecodeError, ModelError, UsageError
 from rcilab.makers.franka.bounds import CLIENT_PORT
 from rcilab.makers.franka.controller.fci_controller import FciController
 from rcilab.makers.franka.controller.hand_server import HAND_PORT, HandServer
@@ -50,7 +50,13 @@ _VERSIONS = {"Panda": VERSION_5, "FR3": VERSION_10}
 
 
 def build_fci_server(arm: VirtualArm, config: ControllerConfig) -> FciServer:
-    """Returns the FCI server of an arm with a configuration."""
+    """Returns the FCI server of an arm with a configuration.
+
+    Raises:
+        UsageError: The arm is to listen on the port of the hand.
+    """
+    if config.port == HAND_PORT:
+        raise UsageError(f"--port {HAND_PORT} is where clients expect the hand; choose another port for the arm")
     version = _VERSIONS[arm.model.name]
     # Its clients filter and limit their commands against q_d of the state, which a delay would make unstable.
     arm.set_prefill(0 if config.prefill is None else config.prefill)
@@ -97,7 +103,7 @@ class FciServer:
         self.controller = controller
         self.channels = (
             TcpChannel(protocol=_PROTOCOL, port=port, open_framer=FrameReader),
-            UdpChannel(port=0 if udp_port is None else udp_port, target_port=0),
+            UdpChannel(port=0 if udp_port is None else udp_port, target_port=0, is_state_port_only=True),
         )
         self._hand = HandServer(HAND_PORT if port else 0)
         self.channels = (*self.channels, self._hand.channel)

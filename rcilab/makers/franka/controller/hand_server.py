@@ -32,7 +32,9 @@ class HandServer:
     """
 
     def __init__(self, port: int) -> None:
-        self.channel = TcpChannel(name="hand_port", protocol="hand", port=port, open_framer=HandFrameReader)
+        self.channel = TcpChannel(
+            name="hand_port", protocol="hand", port=port, open_framer=HandFrameReader, option=None
+        )
         self.hand = FrankaHand()
         self._link: ClientLink
         self._peer: Peer | None = None

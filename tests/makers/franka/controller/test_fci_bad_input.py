@@ -235,6 +235,25 @@ def test_a_foreign_host_commands_nothing(place: FciArena, robot: Robot) -> None:
     assert len(place.log("unknown_sender")) == 1
 
 
+def test_another_program_of_the_clients_machine_commands_nothing(place: FciArena, robot: Robot) -> None:
+    start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
+    assert robot._source is not None
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        other.sendto(robot.pack(start.message_id, Output(q=(1.0,) * 7)), robot._source)
+        place.between(lambda: None)
+        ending = robot.play(start, programs.motion(start, wire.JOINT_POSITION), cycles=201)
+    assert (ending.status, ending.state.errors) == ("success", ())
+    assert len(place.log("unknown_sender")) == 1
+
+
+def test_frames_that_came_with_a_bad_one_are_void(place: FciArena) -> None:
+    move = wire.pack_frame(1, 3, wire.pack_move(place.version, wire.JOINT_IMPEDANCE, wire.JOINT_POSITION))
+    raw(place, connect(place.version) + struct.pack("<III", 99, 2, 12) + move)
+    good_client_works(place)
+    assert len(place.log("motion_started")) == 1  # That of the good client.
+
+
 def test_old_repeated_and_early_commands_do_not_move_the_arm_twice(robot: Robot) -> None:
     start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
     program = programs.motion(start, wire.JOINT_POSITION)

@@ -9,6 +9,9 @@ from collections.abc import Iterator
 
 import pytest
 
+from rcilab.core.errors import UsageError
+from rcilab.makers.virtual_controller import build_virtual_controller
+from rcilab.sim.controller_config import ControllerConfig
 from tests.peers.franka import hand as wire
 from tests.peers.franka import programs
 from tests.peers.franka.arena import FciArena
@@ -122,3 +125,8 @@ def test_a_second_client_of_the_hand_is_refused(place: FciArena, hand: Hand) -> 
     with pytest.raises((ConnectionResetError, BrokenPipeError)):
         place.connect_hand()
     assert hand.ask(wire.STOP) == "success"
+
+
+def test_the_arm_does_not_listen_on_the_port_of_the_hand() -> None:
+    with pytest.raises(UsageError, match="--port 1338 is where clients expect the hand; choose another"):
+        build_virtual_controller(ControllerConfig(model="Panda", host="127.0.0.5", port=1338))
