@@ -172,20 +172,6 @@ class Stepper:
         problem.max_velocity = [1.0 if end is None else v for end, v in zip(ends, dq, strict=True)]
         self._step()
 
-    def step_to_moving(self, q: Sequence[float], dq: Sequence[float], velocity: Sequence[float]) -> None:
-        """Advances one cycle towards moving positions.
-
-        Args:
-            q: Positions, [rad].
-            dq: Their velocities, inside the bounds, [rad/s].
-            velocity: Bounds, above zero, [rad/s].
-        """
-        problem = self._problem
-        self._by_velocity = False
-        problem.per_dof_control_interface = [_POSITION] * len(self.q)
-        problem.target_position, problem.target_velocity, problem.max_velocity = q, dq, velocity
-        self._step()
-
     def _step(self) -> None:
         """Advances one cycle; if ruckig finds no curve, every axis brakes in this cycle."""
         if not self._update():

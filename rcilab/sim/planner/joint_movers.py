@@ -137,7 +137,7 @@ class StreamMover:
         self._axes = _ruckig.Stepper(*state, *self._bounds)
         self._velocity: list[float] = bounds.velocity.tolist()
         self._filter = StreamFilter(state.q, "direct", 0.0)
-        self.target = self._followed = list(state.q)
+        self.target = list(state.q)
         self._past: list[list[float]] = []  # The last angles, the newest first, while they are smoothed.
 
     @property
@@ -163,7 +163,6 @@ class StreamMover:
         if (mode, smoothing) != (self._filter.mode, self._filter.smoothing):
             self._filter = StreamFilter(self._axes.q, mode, smoothing)
             q0, dq, ddq = self.state
-            self._followed = q0
             self._past = [
                 [x - k * CYCLE_TIME * (v - 0.5 * k * CYCLE_TIME * a) for x, v, a in zip(q0, dq, ddq, strict=True)]
                 for k in range(3)
@@ -177,14 +176,8 @@ class StreamMover:
         if self.is_stationary:
             return list(self._axes.q)
         q = self._filter.step()
-        if self._filter.mode == "direct":
+        if self._filter.mode == "direct" or not self._takes(q):
             self._axes.step_to_positions(q, self._velocity)
-            return list(self._axes.q)
-        rates = [(new - old) / CYCLE_TIME for new, old in zip(q, self._followed, strict=True)]
-        self._followed = q
-        if not self._takes(q):
-            ends = [min(max(v, -bound), bound) for v, bound in zip(rates, self._velocity, strict=True)]
-            self._axes.step_to_moving(q, ends, self._velocity)
         q = list(self._axes.q)
         self._past = [q, *self._past[:2]]
         return q
@@ -192,7 +185,7 @@ class StreamMover:
     def _takes(self, q: Sequence[float]) -> bool:
         """Advances to these angles if that is inside the bounds by differences; returns whether it is.
 
-        The fastest motion to a moving place, which the planner would compute, accelerates to and fro around it.
+        Otherwise the joints would brake for every place on the way.
         """
         h = CYCLE_TIME
         dq: list[float] = []

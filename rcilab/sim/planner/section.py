@@ -60,7 +60,7 @@ class Section(Protocol):
 class PoseSolver:
     """The joint angles of a pose that are nearest to others. Owned by a planner.
 
-    An arm with a redundant joint moves its joints least, any other stays on its branch.
+    A redundant arm moves its joints least, any other stays on its branch.
 
     Args:
         model: The arm with its tool.

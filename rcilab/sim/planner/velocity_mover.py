@@ -41,6 +41,7 @@ class VelocityMover:
         self._jog: Jog | None = None
         self._stop: StopMover | None = StopMover(limits.joint, state)  # Before the command.
         self._command: Callable[[Jog], None] = Jog.stop
+        self._end: Callable[[Jog], None] = Jog.stop  # After the time of the command.
         self._is_stopping = True
         self._cycles: int | None = None  # Until it stops.
         if self._stop.is_stationary:
@@ -109,6 +110,7 @@ class VelocityMover:
         }
         inside = {name: min(x, getattr(cartesian, name)) for name, x in wanted.items() if x is not None}
         limits = replace(self._limits, cartesian=replace(cartesian, **inside))
+        self._end = lambda jog: jog.set_twist(np.zeros(6), frame=frame)
         self._begin(limits, lambda jog: jog.set_twist(twist, frame=frame), any(twist), duration)
 
     def step(self) -> list[float]:
@@ -126,7 +128,7 @@ class VelocityMover:
             if self._cycles < 0:
                 self._cycles = None
                 self._is_stopping = True
-                self._jog.stop()
+                self._end(self._jog)
         return self._jog.step().tolist()
 
     def _begin(self, limits: Limits, command: Callable[[Jog], None], is_moving: bool, duration: float | None) -> None:

@@ -26,7 +26,7 @@ INSIDE = [1.0, 1.0, 1.0]
 SLOW = ToolSpeed(velocity=0.2)
 
 
-@pytest.fixture(params=["xMate3", "FR3"], scope="module")
+@pytest.fixture(params=["xArm6", "RM75"], scope="module")
 def model(request: pytest.FixtureRequest) -> RobotModel:
     return load_model(request.param)
 
@@ -76,7 +76,8 @@ def test_random_changes_of_poses_keep_the_limits(model: RobotModel, seed: int) -
     start = model.forward(model.home)
     poses = [
         Pose.from_rpy(
-            start.position + random.uniform(-0.08, 0.08, 3) - (0.08, 0.0, 0.0), start.rpy + random.uniform(-0.2, 0.2, 3)
+            start.position + random.uniform(-0.06, 0.06, 3) - (0.06, 0.0, 0.06),
+            start.rpy + random.uniform(-0.2, 0.2, 3),
         )
         for _ in range(8)
     ]
@@ -127,7 +128,7 @@ def test_a_joint_stops_at_the_end_of_its_range(model: RobotModel) -> None:
     dq[0] = 1.5
     planner = planner_of(model)
     planner.set_joint_velocity(dq)
-    rows = np.array([planner.step().q for _ in range(4000)])
+    rows = np.array([planner.step().q for _ in range(6000)])
     assert (rows[:, 0] < model.limits.joint.upper[0]).all()
     assert rows[-1, 0] > model.limits.joint.upper[0] - 0.1
     assert planner.state is PlannerState.MOVING, "until another command"
@@ -140,8 +141,8 @@ def test_a_twist_in_tool_axes_moves_the_tool_and_ends(model: RobotModel) -> None
     points = model.position_path(rows)
     along = start.rotation[:, 2]
     moved = (points[-1] - points[0]) @ along
-    assert moved == pytest.approx(0.05, rel=0.05)
-    assert distances_from_line(points, points[0], points[0] + along).max() < 1e-4
+    assert moved == pytest.approx(0.05, rel=0.02)
+    assert distances_from_line(points, points[0], points[0] + along).max() < 2e-5
     assert largest_shares(rows, model.limits.joint) < INSIDE
 
 
@@ -152,7 +153,8 @@ def test_any_command_follows_any_other_inside_the_limits(model: RobotModel, seed
 
     def some_pose() -> Pose:
         return Pose.from_rpy(
-            start.position + random.uniform(-0.08, 0.08, 3) - (0.08, 0.0, 0.0), start.rpy + random.uniform(-0.2, 0.2, 3)
+            start.position + random.uniform(-0.06, 0.06, 3) - (0.06, 0.0, 0.06),
+            start.rpy + random.uniform(-0.2, 0.2, 3),
         )
 
     def command(planner: Planner) -> None:

@@ -16,7 +16,7 @@ from tests.sim.planner.driving import drive, largest_shares, shifted
 PERIOD = 4  # [cycles] 250 Hz.
 
 
-@pytest.fixture(params=["xMate3", "FR3"], scope="module")
+@pytest.fixture(params=["xArm6", "RM75"], scope="module")
 def model(request: pytest.FixtureRequest) -> RobotModel:
     return load_model(request.param)
 
@@ -48,7 +48,7 @@ def test_a_stream_is_followed_inside_the_limits(model: RobotModel, mode: StreamM
     assert largest_shares(rows, model.limits.joint) < [1.0, 1.0, 1.0]
     np.testing.assert_allclose(rows[-1], sine(model, 2000), atol=1e-7)
     lag = np.abs(rows[1001] - sine(model, 1000)).max()
-    assert lag < 0.05
+    assert lag < 0.06
 
 
 def test_smoothing_reduces_the_acceleration(model: RobotModel) -> None:
@@ -57,7 +57,7 @@ def test_smoothing_reduces_the_acceleration(model: RobotModel) -> None:
             cycle: lambda planner, cycle=cycle: planner.follow_joints(
                 sine(model, cycle).tolist(), mode=mode, smoothing=smoothing
             )
-            for cycle in range(0, 1001, 10)
+            for cycle in range(0, 1001, PERIOD)
         }
         rows, _ = drive(planner_of(model), actions)
         return float(np.abs(np.diff(rows[100:900], 2, axis=0)).max())
