@@ -77,16 +77,16 @@ class ContactDetector:
     """
 
     def __init__(self, thresholds: ContactThresholds) -> None:
+        joints, axes = (False,) * len(thresholds.contact_torque), (False,) * len(thresholds.contact_force)
+        self._none = self.present = self.shown = Contacts(joints, axes, joints, axes)
         self.configure(thresholds)
 
     def configure(self, thresholds: ContactThresholds) -> None:
-        """Sets other thresholds, and resets."""
+        """Sets other thresholds, from the next cycle on."""
         self._thresholds = t = thresholds
         torques = t.contact_torque, t.collision_torque, t.contact_torque_accelerating, t.collision_torque_accelerating
         forces = t.contact_force, t.collision_force, t.contact_force_accelerating, t.collision_force_accelerating
         self._lowest = min(map(min, torques)), min(map(min, forces))
-        joints, axes = (False,) * len(thresholds.contact_torque), (False,) * len(thresholds.contact_force)
-        self._none = self.present = self.shown = Contacts(joints, axes, joints, axes)
 
     def reset(self) -> None:
         """Clears the collisions, as an error recovery does."""

@@ -1,7 +1,8 @@
 """The ideal plant: it is exactly at its setpoint, and torques move it by the rigid-body model.
 
     POSITION   q = q_c; with the joint torques tau = M ddq_c + C dq_c + g - J^T w
-    TORQUE     M ddq + C dq + g = tau_c + g_model + J^T w, integrated over 1 ms; no friction, no limit of torque
+    TORQUE     M ddq + C dq + g = tau_c + g_model + J^T w, integrated over 1 ms; no limit of torque, and no friction
+               or rotors but those of the description, which the measured torques, at the links, lack
     BRAKED     stops at once, with any external force
 
 w is the external wrench (`push`). g_model is the gravity of the controller's model, g that of the physical load
@@ -150,9 +151,13 @@ class IdealPlant:
         dq = dq + _CYCLE * ddq
         q = q + _CYCLE * dq
         self._is_stationary = False
-        self._measurement = Measurement(
-            make_readonly(q), make_readonly(dq), make_readonly(tau_c + self._model.rigid_body.gravity(q))
-        )
+        tau_links = tau_c + self._model.rigid_body.gravity(q)
+        if damping is not None:
+            tau_links -= damping * dq
+        rotors = self._model.description.rotor_inertia
+        if rotors is not None:
+            tau_links -= rotors * ddq
+        self._measurement = Measurement(make_readonly(q), make_readonly(dq), make_readonly(tau_links))
         return self._measurement
 
     def _acceleration(self, q: JointVector, dq: JointVector, tau: JointVector) -> JointVector:

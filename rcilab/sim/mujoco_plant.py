@@ -7,9 +7,10 @@ Each millisecond is one `mj_step`. The drives apply to the joints:
     BRAKED     the brakes stop the arm within about 0.1 s and hold external forces; then the arm is rigid
 
 w is the external wrench. The position servo uses the physical load, like one with integral action in steady state;
-TORQUE compensates the gravity of the load from setLoad (`g_model`). The drives compensate
-90 % of the friction. In TORQUE a joint torque loop compensates the inertia of the rotors, so that the commanded
-torque acts at the output of the gear; in POSITION the rotors are accelerated with the links.
+TORQUE compensates the gravity of the load from setLoad (`g_model`). The drives compensate 90 % of the friction, or all
+of it where the description has the damping that commanded torques meet. In TORQUE a joint torque loop compensates the
+inertia of the rotors, so that the commanded torque acts at the output of the gear; in POSITION the rotors are
+accelerated with the links.
 
 The torque of a drive in addition to the compensation is limited. The manual's torque limit is that of a torque command;
 a drive needs more: with the rated load, gravity of the stretched arm alone exceeds it, and the manual's accelerations
@@ -273,7 +274,8 @@ class MuJoCoPlant:
         self._damping = model.description.damping
         self._rotors: Array = ARMATURE_PER_TORQUE * torque if rotors is None else np.array(rotors)
         self._friction: Array = self._friction_scale * DAMPING_PER_TORQUE * torque
-        self._known_friction = FRICTION_KNOWN * self._friction
+        # An arm whose description has damping has no other friction.
+        self._known_friction = (FRICTION_KNOWN if self._damping is None else 1.0) * self._friction
         self._product = np.zeros(model.n)
         self._has_rotor_inertia = True
         self._still_for = 0

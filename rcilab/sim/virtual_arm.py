@@ -11,7 +11,7 @@ the last good command; where it was compliant (impedance, torque, hand guiding),
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -204,6 +204,11 @@ class VirtualArm:
             sensors.tau_ext,
             sensors.wrench,
         )
+
+    @property
+    def drive_torque(self) -> Sequence[float] | None:
+        """Torque of the control law in the last cycle, without gravity, n numbers, [N m]; None on the servos."""
+        return None if self._setpoint is None else self._setpoint.tau
 
     def reset(self, q: JointVector) -> None:
         """Places the stationary arm at other joint angles."""

@@ -143,3 +143,18 @@ def test_a_yielding_arm_feels_what_accelerates_it(make: Maker) -> None:
         tau_ext, _ = observer.step(measured)
     assert tau_ext == pytest.approx(model.jacobian(measured.q).T @ wrench, abs=0.25)
     assert np.abs(measured.dq).max() > 0.2
+
+
+@both
+@pytest.mark.parametrize("name", ["Panda", "FR3"])
+def test_rotors_and_damping_that_a_model_has_are_no_external_force(make: Maker, name: str) -> None:
+    model = load_model(name)
+    plant, observer = make(model), MomentumObserver(model)
+    rest = plant.reset(model.home)
+    observer.reset(rest)
+    still, largest = hold(rest), 0.0
+    for k in range(600):
+        tau = np.array([6.0, 4.0, -4.0, 3.0, 1.0, 1.0, 0.5]) * np.sin(2.0 * np.pi * k / 600.0)
+        measured = plant.step(Setpoint(Drive.TORQUE, still.q, still.dq, still.ddq, tau))
+        largest = max(largest, float(np.abs(observer.step(measured)[0]).max()))
+    assert largest < 0.1

@@ -225,3 +225,14 @@ def test_nothing_is_solid_around_the_ideal_plant(model: RobotModel) -> None:
         plant.set_walls(SafetyBox(size=(1.0, 1.0, 1.0), T_base_box=Pose()))
     plant.set_floor(False)
     plant.set_walls(None)
+
+
+@pytest.mark.parametrize("name", ["Panda", "FR3"])
+def test_an_arm_whose_description_has_damping_coasts_alike_on_both_plants(name: str) -> None:
+    model = load_model(name)
+    speeds = []
+    for plant in (IdealPlant(model), MuJoCoPlant(model)):
+        plant.reset(model.home)
+        run(plant, twist(model.home, [6.0, *[0.0] * 6]), 300)
+        speeds.append(float(run(plant, twist(model.home, [0.0] * 7), 1000).dq[0]))
+    assert speeds[1] == pytest.approx(speeds[0], rel=0.01)

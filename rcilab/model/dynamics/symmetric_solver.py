@@ -40,6 +40,10 @@ class SymmetricSolver:
         """
         return self._decomposition.compute(A).solve(b)
 
+    def is_definite(self, A: Matrix) -> bool:
+        """Returns whether a symmetric matrix is positive-definite, shape (size, size)."""
+        return self._decomposition.compute(A).info() == _SUCCESS
+
     @property
     def determinant(self) -> float:
         """Determinant of the last matrix; undefined if it was not positive-definite."""

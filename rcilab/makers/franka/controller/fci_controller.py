@@ -33,7 +33,7 @@ from rcilab.makers.franka.controller.phases import (
     Phase,
 )
 from rcilab.makers.franka.controller.pose_deviation import PoseDeviations, find_deviation
-from rcilab.makers.franka.controller.reporter import StateReporter
+from rcilab.makers.franka.controller.reporter import SINGULAR, StateReporter
 from rcilab.makers.franka.controller.settings import Settings, apply_request, apply_setup
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.limit_tables import DEFAULT_TABLE, cartesian_limits, require_table
@@ -54,7 +54,6 @@ from rcilab.sim.self_collision import SelfCollisionWatch
 from rcilab.sim.violations import Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 
-SINGULAR = 0.01  # Smallest singular value of the Jacobian, in metres and radians, at which a Cartesian motion begins.
 SUCCESS_WINDOW = 100  # [cycles] Over which the share of commands in time is reported.
 STATES_BEFORE_START = 2  # That a client reads after Move: one that shows the motion, and the one it answers.
 RECOVERY_TIME = 50  # [cycles] Shortest duration of an error recovery, so that it is visible to a client.
@@ -465,6 +464,7 @@ class FciController:
         return self._reporter.report(
             self._message_id,
             self.arm.signals,
+            self.arm.drive_torque,
             faults=self.faults,
             success_rate=self.playout.success_rate,
             motion_generator_mode=MotionGeneratorMode.IDLE if motion is None else motion.reported_generator,

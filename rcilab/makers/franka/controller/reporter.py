@@ -7,16 +7,18 @@ filter lies between them that this arm would not follow. While torques move the 
 * External torques and forces have the sign of libfranka's robot_state.h: those that the arm exerts on its environment
   are positive. The wrench is at the origin of the stiffness frame K, in axes of the base (`O_F_ext_hat_K`) or of K
   (`K_F_ext_hat_K`). In rcilab's own state they are those that the environment exerts on the arm.
+* Near a singularity the wrench is zero: `SINGULAR`.
 * A contact disappears with its force, a collision with the error recovery.
 * The drives have no elasticity: theta is q, dtheta is dq.
-* tau_J has gravity; tau_J_d and commanded torques have not: the controller compensates it.
+* tau_J has gravity; tau_J_d and commanded torques have not: the controller compensates it. While an impedance moves the
+  arm, tau_J_d are its torques.
 * The acceleration sensors, two at each joint but the last, read those of a stationary arm: the reaction to gravity, in
   the axes of Craig's frame of the joint.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain
 from math import cos, sin
 
@@ -34,13 +36,19 @@ from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.robots.arm import CRAIG
 from rcilab.makers.franka.wire.state_packet import NUMBERS, SLICES
 from rcilab.model.dynamics.payload import Payload
+from rcilab.model.dynamics.symmetric_solver import SymmetricSolver
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.contact_detector import ContactDetector, Contacts
+from rcilab.sim.plant import Measurement
 from rcilab.sim.reference_trajectory import ReferenceTrajectory
 from rcilab.sim.virtual_arm import CycleSignals
 from rcilab.sim.wrench import wrench_at, wrench_in
 
 GRAVITY = 9.81  # [m/s^2]
+SINGULAR = 0.01
+"""Smallest singular value of the Jacobian, in metres and radians, at which a Cartesian motion begins and forces on the
+tool are reported; rcilab's own choice."""
+_SINGULAR_SQUARE = SINGULAR**2 * np.eye(6)
 _JOINT_4 = 3  # From 0.
 _TWISTS = tuple((cos(row.alpha), sin(row.alpha)) for row in CRAIG[:6])  # Of the joints with a sensor.
 _AXES = ("along x", "along y", "along z", "about x", "about y", "about z")
@@ -69,12 +77,14 @@ class StateReporter:
         self._zeros6 = readonly_copy(np.zeros(6))
         self._tau_d = self._zeros
         self._q = self._zeros
+        self._contacts = ContactDetector(settings.thresholds)
+        self._solver = SymmetricSolver(6)
         self.configure(model, settings)
 
     def configure(self, model: RobotModel, settings: Settings) -> None:
         """Sets new frames, loads or thresholds; only at standstill."""
         self._model, self._settings = model, settings
-        self._contacts = ContactDetector(settings.thresholds)
+        self._contacts.configure(settings.thresholds)
         self._shown: Contacts | None = None
         self._flags = np.zeros(0)  # Those of `_shown` as numbers.
         self._lever = settings.EE_T_K
@@ -94,6 +104,7 @@ class StateReporter:
         self,
         message_id: int,
         signals: CycleSignals,
+        tau_drives: Sequence[float] | None,
         *,
         faults: tuple[FrankaError, ...],
         success_rate: float,
@@ -101,7 +112,20 @@ class StateReporter:
         controller_mode: ControllerMode,
         robot_mode: RobotMode,
     ) -> RobotState:
-        """Returns the state of this cycle, and updates the numbers of its datagram."""
+        """Returns the state of this cycle, and updates the numbers of its datagram.
+
+        Args:
+            message_id: Number of the state.
+            signals: Those of the cycle.
+            tau_drives: Torques of a control law without gravity, n numbers, [N m]; None: the servos hold the arm.
+            faults: The errors that are set.
+            success_rate: Share of commands in time.
+            motion_generator_mode: Of the motion.
+            controller_mode: Of the motion.
+            robot_mode: Of the phase.
+        """
+        if any(signals.wrench.tolist()) and self._is_singular(signals.measured):
+            signals = signals._replace(wrench=self._zeros6)
         commanded, tool_c, measured, tool, tau_commanded, _, wrench = signals
         q_c, dq_c, ddq_c = commanded.arrays
         if tau_commanded is None:
@@ -111,7 +135,7 @@ class StateReporter:
         dtau = (tau_d - self._tau_d) / CYCLE_TIME if self._signals is not None else self._zeros
         self._tau_d = tau_d
         rates = make_readonly(np.array([*tool_c.twist, *tool_c.acceleration]))
-        self._write(signals, rates)
+        self._write(signals, rates, tau_drives)
         self._signals, self._q = signals, measured.q
         return build_state(
             (
@@ -185,12 +209,14 @@ class StateReporter:
         """Clears the flags of collisions, as an error recovery does."""
         self._contacts.reset()
 
-    def _write(self, signals: CycleSignals, rates: Array) -> None:
+    def _write(self, signals: CycleSignals, rates: Array, tau_drives: Sequence[float] | None) -> None:
         commanded, tool_c, measured, tool, tau_c, tau_ext, wrench = signals
         q_c, dq_c, ddq_c = commanded.arrays
         q, dq, tau, last = measured.q, measured.dq, measured.tau, self._signals
         T_c = tool_c.matrix.T.ravel()
-        tau_d = self._torque_without_gravity(commanded) if tau_c is None else tau_c
+        tau_d = tau_drives if tau_c is None else tau_c
+        if tau_d is None:
+            tau_d = self._torque_without_gravity(commanded)
         at_K, self._wrench_in_K = self._at_stiffness_frame(tool.pose, wrench)
         self._contacts.step(tau_ext.tolist(), self._wrench_in_K.tolist(), is_accelerating=commanded.is_accelerating)
         elbow_c = tool_c.psi, self._side(float(q_c[_JOINT_4]))
@@ -213,6 +239,10 @@ class StateReporter:
 
     def _torque_without_gravity(self, commanded: ReferenceTrajectory) -> JointVector:
         return self._zeros if commanded.is_stationary else self._model.rigid_body.motion_torque(*commanded.arrays)
+
+    def _is_singular(self, measured: Measurement) -> bool:
+        J = self._model.rigid_body.tool_terms(measured.q, measured.dq).jacobian
+        return not self._solver.is_definite(J.dot(J.T) - _SINGULAR_SQUARE)
 
     def _at_stiffness_frame(self, T_base_tool: Pose, wrench: Array) -> tuple[Array, Array]:
         """Returns a wrench on the end effector (base axes, its origin) at the origin of K, in base and in K axes."""

@@ -14,7 +14,7 @@ from rcilab.makers.franka.controller.reporter import columns_of
 from rcilab.makers.franka.controller.settings import DEFAULT_THRESHOLDS
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.wire.command_packet import CommandPacket
-from rcilab.makers.franka.wire.requests import Move, SetCartesianImpedance, SetEEToK, SetNEToEE
+from rcilab.makers.franka.wire.requests import Move, SetCartesianImpedance, SetEEToK, SetJointImpedance, SetNEToEE
 from rcilab.makers.franka.wire.state_packet import SLICES
 from rcilab.makers.franka.wire.versions import VERSION_5, Status
 from rcilab.model.robot_model import load_model
@@ -103,3 +103,46 @@ def test_a_collision_in_a_motion_is_a_reflex(controller: FciController) -> None:
             break
     assert controller.faults == (FrankaError.CARTESIAN_REFLEX,)
     assert controller.phase is Phase.REFLEX
+
+
+def test_a_setter_in_reflex_keeps_the_flags_of_the_collision(controller: FciController) -> None:
+    push(controller, (0.0, 0.0, -60.0, 0.0, 0.0, 0.0))
+    push(controller, (0.0,) * 6)
+    before = field(controller, "cartesian_collision")
+    assert before.any()
+    assert controller.set(SetEEToK(columns_of(Pose())))[0] is Status.SUCCESS
+    controller.step()
+    assert field(controller, "cartesian_collision").tolist() == before.tolist()
+
+
+def test_near_a_singularity_the_wrench_is_zero_and_the_torques_are_not(controller: FciController) -> None:
+    q = [0.0, 0.2, 0.0, -0.467002423653011, 0.0, 1.6, 0.78]
+    controller.reset(np.array(q))
+    push(controller, (0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
+    assert np.abs(field(controller, "tau_ext_hat_filtered")).max() > 3.0
+    for name in ("O_F_ext_hat_K", "K_F_ext_hat_K"):
+        assert field(controller, name).tolist() == [0.0] * 6
+    assert not controller.state.tau_ext_in_base.any()
+    q[3] = -0.8
+    controller.reset(np.array(q))
+    push(controller, (0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
+    assert field(controller, "O_F_ext_hat_K")[2] == pytest.approx(10.0, abs=1.0)
+
+
+@pytest.mark.parametrize("generator", [0, 2])
+def test_while_an_impedance_pushes_its_torques_are_in_the_state(controller: FciController, generator: int) -> None:
+    assert controller.set(SetJointImpedance((300.0,) * 7))[0] is Status.SUCCESS
+    assert controller.begin_move(Move(generator // 2, generator, FAR, FAR)) is Status.MOTION_STARTED
+    q, pose = tuple(controller.arm.commanded.q), columns_of(controller.arm.tool_c.pose)
+    before = controller.arm.signals.measured.tau
+    controller.arm.plant.push((8.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    for k in range(1500):
+        packet = CommandPacket(k, q, ZERO, pose, (0.0,) * 6, (0.0, -1.0), False, False, ZERO, False)
+        controller.receive(packet)
+        controller.step()
+    gravity = MODEL.torque(controller.arm.signals.measured.q).gravity
+    desired, measured = field(controller, "tau_J_d"), controller.arm.signals.measured
+    assert np.abs(measured.tau - before).max() > 1.0
+    assert desired == pytest.approx(measured.tau - gravity, abs=0.05)
+    if generator == 0:
+        assert desired == pytest.approx(300.0 * (np.array(q) - measured.q), abs=0.1)

@@ -125,10 +125,11 @@ def test_commanded_torques_are_in_the_state_without_gravity(robot: Robot) -> Non
     for k in range(30):
         tau = tuple(0.01 * k * (joint + 1) for joint in range(7))
         robot.answer(state, Output(dq=programs.ZERO, tau=tau))
-        state = robot.state()
+        last, state = state, robot.state()
         assert state.tau_J_d == pytest.approx(tau, abs=1e-6)
-    model = model_of(robot)
-    assert np.subtract(state.tau_J, state.tau_J_d) == pytest.approx(model.torque(state.q).gravity, abs=1e-2)
+    ddq = np.subtract(state.dq, last.dq) / 0.001
+    of_links = model_of(robot).torque(state.q, state.dq, ddq).full
+    assert state.tau_J == pytest.approx(of_links, abs=2e-2)  # Less than tau_J_d and gravity, by rotors and damping.
 
 
 def test_the_elbow_changes_sides_where_the_arm_is_stretched(robot: Robot, place: FciArena) -> None:
