@@ -206,7 +206,7 @@ class VirtualArm:
         )
 
     @property
-    def drive_torque(self) -> Sequence[float] | None:
+    def drive_torque(self) -> Sequence[float] | Array | None:
         """Torque of the control law in the last cycle, without gravity, n numbers, [N m]; None on the servos."""
         return None if self._setpoint is None else self._setpoint.tau
 

@@ -104,7 +104,7 @@ class StateReporter:
         self,
         message_id: int,
         signals: CycleSignals,
-        tau_drives: Sequence[float] | None,
+        tau_drives: Sequence[float] | Array | None,
         *,
         faults: tuple[FrankaError, ...],
         success_rate: float,
@@ -209,7 +209,7 @@ class StateReporter:
         """Clears the flags of collisions, as an error recovery does."""
         self._contacts.reset()
 
-    def _write(self, signals: CycleSignals, rates: Array, tau_drives: Sequence[float] | None) -> None:
+    def _write(self, signals: CycleSignals, rates: Array, tau_drives: Sequence[float] | Array | None) -> None:
         commanded, tool_c, measured, tool, tau_c, tau_ext, wrench = signals
         q_c, dq_c, ddq_c = commanded.arrays
         q, dq, tau, last = measured.q, measured.dq, measured.tau, self._signals
