@@ -31,7 +31,7 @@ class Ufactory:
     scheme = "xarm"
     robots = ROBOTS
     client_port = CLIENT_PORT
-    capabilities = Capabilities(longest_tool=LONGEST_TOOL)
+    capabilities = Capabilities(simulates=True, longest_tool=LONGEST_TOOL)
     timing = Timing()
 
     def conditions(self) -> ConditionTable:
@@ -59,8 +59,10 @@ class Ufactory:
         return SINGLE_PRECISION
 
     def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:
-        """Not called: `capabilities.simulates` is False."""
-        raise NotImplementedError
+        """Returns the server of an arm."""
+        from rcilab.makers.ufactory.controller.xarm_server import build_xarm_server
+
+        return build_xarm_server(arm, config)
 
     def faults(self) -> type[UfactoryError]:
         """Returns the errors of the controller."""

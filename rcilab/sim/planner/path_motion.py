@@ -293,7 +293,7 @@ class PathMotion:
         self._law.set_stretches(self._pieces[-1].stretches())
 
     def _can_join(self) -> bool:
-        if self._is_corner_tried or not (self._pieces and self._ready):
+        if self._is_corner_tried or not (self._pieces and self._chain and self._ready):
             return False
         return can_join(self._chain[-1], self._ready[0])
 

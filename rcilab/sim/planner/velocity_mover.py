@@ -84,6 +84,8 @@ class VelocityMover:
         acceleration = np.maximum(parts * bounds.acceleration, present)
         limits = replace(joint, acceleration=readonly_copy(acceleration), jerk=readonly_copy(parts * bounds.jerk))
         self._begin(replace(self._limits, joint=limits), lambda jog: jog.set_joint_velocity(wanted), any(dq), duration)
+        still = [0.0] * len(wanted)
+        self._end = lambda jog: self.set_joint_velocity(still, speed, is_synchronized=is_synchronized, duration=None)
 
     def set_twist(self, twist: Sequence[float], speed: ToolSpeed, frame: Frame, duration: float | None) -> None:
         """Moves the tool with a constant twist from the next step on.
@@ -129,6 +131,7 @@ class VelocityMover:
                 self._cycles = None
                 self._is_stopping = True
                 self._end(self._jog)
+                return self.step()
         return self._jog.step().tolist()
 
     def _begin(self, limits: Limits, command: Callable[[Jog], None], is_moving: bool, duration: float | None) -> None:

@@ -123,6 +123,20 @@ def test_joint_velocities_are_reached_together_held_and_end(model: RobotModel) -
     assert largest_shares(rows, model.limits.joint) < INSIDE
 
 
+def test_joint_velocities_that_are_repeated_end_as_fast(model: RobotModel) -> None:
+    dq, speed = np.linspace(0.1, 0.3, model.n).tolist(), JointSpeed(acceleration=1.0)
+    rows, _ = drive(
+        planner_of(model),
+        {
+            0: lambda planner: planner.set_joint_velocity(dq, speed=speed),
+            600: lambda planner: planner.set_joint_velocity(dq, speed=speed, duration=0.2),
+        },
+    )
+    assert len(rows) < 1400
+    shares = (np.diff(rows[800:], axis=0) / np.array(dq))[:200]
+    np.testing.assert_allclose(shares, shares[:, :1] * np.ones(model.n), atol=2e-5)
+
+
 def test_a_joint_stops_at_the_end_of_its_range(model: RobotModel) -> None:
     dq = [0.0] * model.n
     dq[0] = 1.5

@@ -20,10 +20,10 @@ def test_a_path_leaves_a_singular_wrist_without_turning_it(name: str) -> None:
     near = q.tolist()
     for step in range(1, 6):
         ahead = model.forward(q).inverse() @ start
-        q_step = q.copy()
-        q_step[-2] = 0.02 * step
-        near = solver.next_to(model.forward(q_step) @ ahead, near)
-    np.testing.assert_allclose(near, q_step, atol=1e-6)
+        turned = q.copy()
+        turned[-2] = 0.02 * step
+        near = solver.next_to(model.forward(turned) @ ahead, near)
+        np.testing.assert_allclose(near, turned, atol=1e-6)
 
 
 def test_a_pose_out_of_reach_is_refused() -> None:

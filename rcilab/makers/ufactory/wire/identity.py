@@ -40,6 +40,6 @@ IDENTITIES = {
     "xArm6": Identity(6, 6),
     "xArm7": Identity(7, 7),
     "Lite6": Identity(6, 9),
-    "UF850": Identity(6, 12),
+    "850": Identity(6, 12),
 }
 """By the name of the arm; the numbers are those of the maker's client library."""
