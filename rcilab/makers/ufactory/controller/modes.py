@@ -1,6 +1,7 @@
 """Modes and states of the controller, and the effect of every command in every one of them: tables, pure.
 
-`docs/xarm-controller.md` has the table as `mode_table` prints it. State 0 can only be set, 1, 2 and 5 can only be reported.
+`docs/xarm-controller.md` has the table as `mode_table` prints it. State 0 can only be set; 1, 2 and 5 can only be
+reported.
 """
 
 from __future__ import annotations
