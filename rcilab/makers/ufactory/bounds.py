@@ -11,6 +11,8 @@ SINGLE_PRECISION: Final = 3e-7  # [rad] or [m] Half a unit in the last place of 
 """Rounding of angles and lengths on the wire."""
 SERVO_PERIOD: Final = 0.004  # [s] User manual, mode 1: at most 250 Hz.
 SERVO_STEP: Final = 0.010  # [m] User manual, mode 1: largest distance between two targets.
+SERVO_SPEED_FACTOR: Final = 1.2
+"""How far joint targets of servo mode may exceed the tool's largest speed; default of `set_linear_spd_limit_factor`."""
 
 JOINT_VELOCITY: Final = pi  # [rad/s] User manual, 10: 180 deg/s.
 JOINT_ACCELERATION: Final = 20.0  # [rad/s^2] User manual, 10: 1146 deg/s^2; the client library has the round number.

@@ -27,8 +27,8 @@ from rcilab.conformance.common_conditions import (
     TOOL_CONDITIONS,
     TOOL_STANDSTILL_CONDITIONS,
 )
-from rcilab.core.condition import Condition, ConditionTable, symmetric_bounds
-from rcilab.makers.ufactory.bounds import SERVO_STEP
+from rcilab.core.condition import Condition, ConditionTable, all_limits, symmetric_bounds
+from rcilab.makers.ufactory.bounds import SERVO_SPEED_FACTOR, SERVO_STEP
 from rcilab.makers.ufactory.errors import UfactoryError
 
 _MANUAL = "user manual of UFACTORY Studio"
@@ -54,7 +54,11 @@ _TOOL_RATES = tuple(
     if row.signal in ("translation", "rotation")
 )
 _SERVO_SPEED = replace(
-    _TOOL_RATES[0], fault=UfactoryError.SERVO_LINEAR_SPEED, source="client library, table of codes, 60"
+    _TOOL_RATES[0],
+    id="servo.velocity.translation",
+    fault=UfactoryError.SERVO_LINEAR_SPEED,
+    source=f"client library, table of codes, 60, and set_linear_spd_limit_factor ({SERVO_SPEED_FACTOR:g} by default)",
+    bounds=lambda limits: symmetric_bounds(SERVO_SPEED_FACTOR * all_limits(limits).cartesian.translation_velocity),
 )
 """On the tool of a motion that is sent as joint angles."""
 
@@ -121,7 +125,7 @@ UFACTORY_CONDITIONS = ConditionTable(
     torque=(),
     measured=_MEASURED,
     box=_BOX,
-    conditions=(*_MOTION, _BOX, *_CARTESIAN, *_BEHAVIOUR),
+    conditions=tuple({row.id: row for row in (*_MOTION, _BOX, *_CARTESIAN, *_BEHAVIOUR)}.values()),
 )
 """The rows for `check` and the monitors."""
 

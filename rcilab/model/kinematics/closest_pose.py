@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import acos, sin
 
+import numpy as np
+
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import UnreachableError
 from rcilab.core.spatial import Pose, wxyz_from_rotation
@@ -13,6 +15,7 @@ from rcilab.model.kinematics.solutions import Solutions
 from rcilab.model.kinematics.solvers.solver import Envelope
 
 _MAX_STRETCH = 0.999  # Share of the full reach for a projected target: a stretched arm is singular.
+_FLIP = 2.5  # [rad] A larger turn of a joint leads to another branch, such as the one over the back.
 _HALVINGS = 12  # Bisection steps along the line to the target: 1/4096 of it, well below a pixel.
 
 
@@ -61,9 +64,12 @@ def closest_reachable(
     if goal is not target:
         try:
             found = solve(goal, True)
-            return ClosestPose(q=found.nearest(q), pose=goal, solutions=found, refusal=refusal)
         except UnreachableError:
             pass
+        else:
+            nearest = found.nearest(q)
+            if np.abs(nearest - q).max() <= _FLIP:
+                return ClosestPose(q=nearest, pose=goal, solutions=found, refusal=refusal)
     return _approach(solve, current, q, goal, refusal)
 
 
@@ -80,9 +86,13 @@ def _approach(
             found = solve(pose, False)
         except UnreachableError:
             high = middle
+            continue
+        nearest = found.nearest(best.q)
+        if np.abs(nearest - best.q).max() > _FLIP:
+            high = middle
         else:
             low = middle
-            best = ClosestPose(q=found.nearest(best.q), pose=pose, solutions=found, refusal=refusal)
+            best = ClosestPose(q=nearest, pose=pose, solutions=found, refusal=refusal)
     return best
 
 

@@ -70,7 +70,7 @@ def test_one_and_many_configurations_are_judged_alike_for_singularities(case):
     np.testing.assert_allclose(one, held_singularity_path(ARM, q), rtol=1e-9)
 
 
-@pytest.fixture(scope="module", params=["Panda", "FR3"])
+@pytest.fixture(scope="module", params=["Panda", "FR3", "xArm7"])
 def thousand(request):
     """An arm, random configurations within its range and their poses."""
     model = load_model(request.param)

@@ -7,6 +7,8 @@ from functools import lru_cache
 from rcilab.core.errors import ModelError
 from rcilab.model.kinematics.solvers.calibrated import CalibratedSolver
 from rcilab.model.kinematics.solvers.numeric.solver import NumericSolver
+from rcilab.model.kinematics.solvers.offset6.arm import build_offset_six
+from rcilab.model.kinematics.solvers.offset6.solver import OffsetSix
 from rcilab.model.kinematics.solvers.offset7.arm import build_offset_geometry
 from rcilab.model.kinematics.solvers.offset7.solver import OffsetSeven
 from rcilab.model.kinematics.solvers.solver import KinematicsSolver
@@ -30,6 +32,10 @@ def build_solver(description: RobotDescription) -> KinematicsSolver:
     try:
         geometry = build_geometry(description)
         return SphericalSeven(geometry) if geometry.n == 7 else SphericalSix(geometry)
+    except ModelError:
+        pass
+    try:
+        return OffsetSix(description, build_offset_six(description))
     except ModelError:
         pass
     try:

@@ -131,7 +131,7 @@ class NumericSolver:
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
         """Returns the feasible redundancy angles, found on a grid."""
         self._require_held_joint()
-        _require_reach(self.envelope, T_base_flange)
+        require_reach(self.envelope, T_base_flange)
         return numeric_arcs(self._arm, self.singularity_path, T_base_flange, lower, upper, outside_box)
 
     def _require_held_joint(self) -> int:
@@ -146,7 +146,7 @@ class _NumericPose:
 
     def branches(self, psi: float) -> list[Angles]:
         arm, pose = self._arm, self._pose
-        _require_reach(self._envelope, pose)
+        require_reach(self._envelope, pose)
         found: list[Angles] = []
         for attempt in range(_ATTEMPTS):
             seeds = arm.seeds(_SEEDS, attempt)
@@ -163,7 +163,7 @@ class _NumericPose:
         return found
 
 
-def _require_reach(envelope: Envelope, pose: Pose) -> None:
+def require_reach(envelope: Envelope, pose: Pose) -> None:
     """Requires a wrist centre within the length of the stretched links from the shoulder.
 
     Raises:

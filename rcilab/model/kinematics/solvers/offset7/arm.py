@@ -1,4 +1,4 @@
-"""An arm with offsets at elbow and wrist, such as the Panda: all joint angles for one pose, as functions of joint 7.
+"""An arm with offsets at elbow and wrist, such as Panda or xArm7: all joint angles for a pose, as functions of joint 7.
 
 Axes 1 to 3 meet in the shoulder S, axes 5 and 6 in the wrist W; axis 7 passes W at a distance, and the elbow is offset
 from upper arm and forearm. For a given angle of joint 7 everything else follows in closed form (He and Liu, IEEE
@@ -11,8 +11,9 @@ a pose is therefore traced by joint 7; `inverse.py` finds the points with joint 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2, hypot, pi, tau
+from math import atan2, hypot, pi, remainder, tau
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from rcilab.core.errors import ModelError, UnreachableError
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.forward import Chain, build_chain
 from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE
-from rcilab.robots.description import RobotDescription
+from rcilab.robots.description import DhRow, RobotDescription
 
 ELBOW = 2
 """Index of the joint whose angle is the arm angle."""
@@ -45,13 +46,17 @@ class OffsetGeometry:
     upper: float
     """Along the upper arm, shoulder to elbow."""
     elbow: float
-    """Offset of the elbow from the upper arm and from the forearm."""
+    """Offset of the elbow from the upper arm."""
+    bend: float
+    """Offset of the elbow from the forearm, to the same side."""
     fore: float
     """Along the forearm, elbow to wrist."""
     wrist: float
-    """Distance of axis 7 from the wrist."""
+    """Distance of axis 7 from the wrist; negative on the other side of the forearm than the Panda's at zero."""
     hand: float
     """Along axis 7, wrist to flange."""
+    offsets: tuple[float, ...]
+    """Angles of the Panda's table minus joint angles, [rad]: zero, or half turns where axes point the other way."""
     chain: Chain
     """From `build_chain`."""
     middles: tuple[float, ...]
@@ -59,13 +64,13 @@ class OffsetGeometry:
 
     @property
     def flip(self) -> float:
-        """Angle of joint 4 of the stretched arm, [rad], at which the elbow flips."""
-        return atan2(self.upper, self.elbow) + atan2(self.fore, self.elbow) - pi
+        """Angle of joint 4 of the stretched arm in the Panda's table, [rad], at which the elbow flips."""
+        return atan2(self.upper, self.elbow) + atan2(self.fore, self.bend) - pi
 
     @property
     def reach(self) -> tuple[float, float]:
         """Shortest and longest distance of the wrist from the shoulder, [m]."""
-        upper, fore = hypot(self.upper, self.elbow), hypot(self.fore, self.elbow)
+        upper, fore = hypot(self.upper, self.elbow), hypot(self.fore, self.bend)
         return abs(upper - fore), upper + fore
 
 
@@ -78,22 +83,36 @@ def build_offset_geometry(description: RobotDescription) -> OffsetGeometry:
     dh = description.dh
     lengths = {0: "d", 2: "da", 3: "a", 4: "d", 5: "a", 6: "d"}
     good = len(dh) == 7 and all(
-        abs(row.alpha - alpha) < _EXACT
-        and not row.theta_offset
+        abs(abs(row.alpha) - abs(alpha)) < _EXACT
         and bool(row.d) == ("d" in lengths.get(i, ""))
         and bool(row.a) == ("a" in lengths.get(i, ""))
         for i, (row, alpha) in enumerate(zip(dh, _TURNS, strict=True))
     )
-    if not good or abs(dh[2].a + dh[3].a) > _EXACT:
+    if not good:
         raise ModelError(
             f"{description.name}: no closed-form inverse for this Denavit-Hartenberg table; it needs a 7-axis arm with "
             "one offset at the elbow, there and back, and one at the wrist"
         )
+    offsets, a = _as_panda(dh)
     joint = description.limits.joint
     return OffsetGeometry(
-        shoulder=dh[0].d, upper=dh[2].d, elbow=dh[2].a, fore=dh[4].d, wrist=dh[5].a, hand=dh[6].d,
-        chain=build_chain(dh), middles=tuple(((joint.lower + joint.upper) / 2.0).tolist()),
+        shoulder=dh[0].d, upper=dh[2].d, elbow=a[2], bend=-a[3], fore=dh[4].d, wrist=a[5], hand=dh[6].d,
+        offsets=offsets, chain=build_chain(dh), middles=tuple(((joint.lower + joint.upper) / 2.0).tolist()),
     )  # fmt: skip
+
+
+def _as_panda(dh: Sequence[DhRow]) -> tuple[tuple[float, ...], list[float]]:
+    """Returns offsets of the joint angles and lengths along x of a table with the Panda's turns, for the same arm.
+
+    RotX(alpha) is RotZ(pi) RotX(-alpha) RotZ(-pi): half a turn of a joint and of the next, and the other way along x.
+    """
+    offsets, a = [row.theta_offset for row in dh], [row.a for row in dh]
+    for i, (row, alpha) in enumerate(zip(dh, _TURNS, strict=True)):
+        if abs(row.alpha - alpha) > _EXACT:
+            offsets[i] += pi
+            offsets[i + 1] -= pi
+            a[i] *= -1.0
+    return tuple(remainder(offset, tau) for offset in offsets), a
 
 
 class SelfMotion:
@@ -170,7 +189,8 @@ def trace(arm: OffsetGeometry, rotation: Array, position: Array, q7: Array) -> t
         Shape (2, 2, K, 7), [rad], NaN without a solution: joint 4 above the flip or below, cos q5 positive
         or negative, joint 2 positive; and the distance of the wrist out of reach, shape (K,), [m], negative inside.
     """
-    c7, s7 = np.cos(q7)[:, None], np.sin(q7)[:, None]
+    theta = q7 + arm.offsets[6]
+    c7, s7 = np.cos(theta)[:, None], np.sin(theta)[:, None]
     x7, y7, z7 = rotation[..., 0], rotation[..., 1], rotation[..., 2]
     x6, y6, z6 = c7 * x7 - s7 * y7, -z7, s7 * x7 + c7 * y7
     to_shoulder = np.array((0.0, 0.0, arm.shoulder)) - (position - arm.hand * z7 - arm.wrist * x6)
@@ -186,7 +206,7 @@ def trace(arm: OffsetGeometry, rotation: Array, position: Array, q7: Array) -> t
     q4 = np.stack((straight - opening, straight - tau + opening))[:, None]  # (2, 1, K)
     c4, s4 = np.cos(q4), np.sin(q4)
     # Shoulder from wrist in the plane of the triangle: off the forearm and along it.
-    off = arm.elbow * (1.0 - c4) - arm.upper * s4
+    off = arm.bend - arm.elbow * c4 - arm.upper * s4
     along = arm.elbow * s4 - arm.upper * c4 - arm.fore
     vx, vy, vz = ((to_shoulder * axis).sum(axis=1) for axis in (x6, y6, z6))
     rest = vx * vx + vy * vy - along * along
@@ -206,8 +226,8 @@ def trace(arm: OffsetGeometry, rotation: Array, position: Array, q7: Array) -> t
     c1, s1 = np.cos(q1), np.sin(q1)
     q3 = np.arctan2(c1 * x3[..., 1] - s1 * x3[..., 0], c1 * y3[..., 1] - s1 * y3[..., 0])
     shape = side.shape
-    columns = (q1, q2, q3, np.broadcast_to(q4, shape), q5, q6, np.broadcast_to(q7, shape))
-    return np.where(exists[..., None], np.stack(columns, axis=-1), np.nan), beyond
+    columns = (q1, q2, q3, np.broadcast_to(q4, shape), q5, q6, np.broadcast_to(theta, shape))
+    return np.where(exists[..., None], np.stack(columns, axis=-1) - np.array(arm.offsets), np.nan), beyond
 
 
 def wrapped(angle: Array) -> Array:

@@ -26,18 +26,12 @@ from rcilab.core.arrays import Array
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.solvers.newton import refine, refine_near
 from rcilab.model.kinematics.solvers.offset7.arm import ELBOW, OffsetGeometry, SelfMotion, trace, wrapped
+from rcilab.model.kinematics.solvers.trigonometric_roots import find_roots, fourier_coefficients
 
 DEGREE = 8
 """Of the polynomial: 16 roots on the circle at most."""
 _NODES = 20
 """Angles of joint 7 at which it is evaluated. Tuning value: 17 determine it, some more even out the rounding."""
-_GRID = 256
-"""Angles at which its sign is evaluated: fine enough that no two extrema lie within a step, unless it is flat."""
-_FLAT, _FINER = 1e-6, 16
-"""Below what part of its size it is flat, and into how many parts a step is cut there; tuning value."""
-_CELL = tau / _GRID
-_NEWTON = 6  # Steps, each of which halves the range of a root if Newton's method leaves it.
-_ROUNDING = 1e-13  # How far a polynomial may miss zero, by the sum of its coefficients, where two roots meet.
 _STEP = 1e-5  # [rad] Of joint 7, by which derivatives are formed.
 _NEAR, _FAR = 1e-4, 0.05  # [rad] How far from psi joint 3 may be at a root: every branch, and the nearest one.
 _SMALL = 1e-8  # [rad] What a joint may still have to turn so that a straight line is exact to rounding.
@@ -46,7 +40,6 @@ _SPREAD = 64  # Number of solutions to return if there are infinitely many; tuni
 _COLUMNS = 8  # At least, as many as the other arms have branches.
 _BLOCK = 512  # Poses computed together, so that intermediate arrays fit into the cache; tuning value.
 
-_HARMONICS = np.arange(DEGREE + 1)
 _ANGLES: Array = np.arange(_NODES, dtype=np.float64) * (tau / _NODES)
 
 
@@ -133,7 +126,7 @@ def inverse_held_batch(arm: OffsetGeometry, T_base_flange: Array, psi: Array) ->
 
 
 def _solve_block(arm: OffsetGeometry, rotations: Array, positions: Array, psi: Array) -> tuple[NDArray[np.intp], Array]:
-    rows, q7 = _roots(harmonics(arm, rotations, positions, psi))
+    rows, q7 = find_roots(harmonics(arm, rotations, positions, psi))
     rows, q = _joint_angles(arm, rotations[rows], positions[rows], psi[rows], rows, q7)
     middles = np.array(arm.middles)
     q = wrapped(q - middles) + middles
@@ -148,15 +141,13 @@ def harmonics(arm: OffsetGeometry, rotations: Array, positions: Array, psi: Arra
 
     Its value at an angle t is the real part of the sum of c_k exp(i k t). Arguments as of `solve_held`.
     """
-    values = polynomial(arm, rotations, positions, psi, _ANGLES)
-    found = np.fft.rfft(values, axis=1)[:, : DEGREE + 1] * (2.0 / _NODES)
-    found[:, 0] *= 0.5
-    return found
+    return fourier_coefficients(polynomial(arm, rotations, positions, psi, _ANGLES), DEGREE)
 
 
 def polynomial(arm: OffsetGeometry, rotations: Array, positions: Array, psi: Array, q7: Array) -> tuple[Array, Array]:
     """Returns H0^2 - (1 - C^2) H1^2 and what divides it, each of shape (N, K), at K angles of joint 7, [rad]."""
-    c7, s7 = np.cos(q7), np.sin(q7)
+    theta = q7 + arm.offsets[6]
+    c7, s7 = np.cos(theta), np.sin(theta)
     X, Y, Z = (rotations[:, :, i] for i in range(3))
     v0 = np.array((0.0, 0.0, arm.shoulder)) - positions + arm.hand * Z
 
@@ -174,16 +165,16 @@ def polynomial(arm: OffsetGeometry, rotations: Array, positions: Array, psi: Arr
     y_cross = (Z[:, 1] * v0[:, 0] - Z[:, 0] * v0[:, 1])[:, None] - arm.wrist * turning(
         Z[:, 0] * X[:, 1] - Z[:, 1] * X[:, 0], Z[:, 0] * Y[:, 1] - Z[:, 1] * Y[:, 0]
     )
-    upper, elbow, fore = arm.upper, arm.elbow, arm.fore
-    F, G = 2.0 * (upper * fore - elbow * elbow), -2.0 * elbow * (upper + fore)
+    upper, elbow, bend, fore = arm.upper, arm.elbow, arm.bend, arm.fore
+    F, G = 2.0 * (upper * fore - elbow * bend), -2.0 * (bend * upper + elbow * fore)
     size = (F * F + G * G) ** 0.5
     cf, sf = F / size, G / size
-    C = (square - (2.0 * elbow * elbow + upper * upper + fore * fore)) / size
+    C = (square - (elbow * elbow + bend * bend + upper * upper + fore * fore)) / size
     rest = 1.0 - C * C
     # Everything that depends on joint 4 is a pair: without the sine of it, and in proportion to it.
     c4, s4 = (cf * C, -sf), (sf * C, cf)
     along = elbow * s4[0] - upper * c4[0] - fore, elbow * s4[1] - upper * c4[1]
-    k = upper + fore * c4[0] - elbow * s4[0], fore * c4[1] - elbow * s4[1]
+    k = upper + fore * c4[0] - bend * s4[0], fore * c4[1] - bend * s4[1]
     cp, sp = np.cos(psi)[:, None], np.sin(psi)[:, None]
     a = c4[0] * vz * sp, c4[1] * vz * sp
     b = k[0] * x6z * sp + x_cross * cp, k[1] * x6z * sp
@@ -194,83 +185,6 @@ def polynomial(arm: OffsetGeometry, rotations: Array, positions: Array, psi: Arr
     H0 = p[0] ** 2 + r[0] ** 2 - d[0] ** 2 + rest * (p[1] ** 2 + r[1] ** 2 - d[1] ** 2)
     H1 = 2.0 * (p[0] * p[1] + r[0] * r[1] - d[0] * d[1])
     return H0 * H0 - rest * H1 * H1
-
-
-def _roots(c: NDArray[np.complex128]) -> tuple[NDArray[np.intp], Array]:
-    """Returns the real roots of polynomials: which each belongs to, shape (R,), and the angle, [rad]."""
-    spectrum = np.zeros((2, len(c), _GRID // 2 + 1), dtype=np.complex128)
-    spectrum[0, :, : DEGREE + 1] = c * (_GRID / 2.0)
-    spectrum[0, :, 0] *= 2.0
-    spectrum[1, :, : DEGREE + 1] = 1j * _HARMONICS * spectrum[0, :, : DEGREE + 1]
-    table = np.empty((2, len(c), _GRID + 1))
-    table[:, :, :-1] = np.fft.irfft(spectrum, _GRID, axis=2)
-    table[:, :, -1] = table[:, :, 0]
-    rows, low, high = _steps(c, np.arange(len(c)), np.zeros(len(c)), _CELL, table)
-    # Where a polynomial is flat, several roots may be close together; refine there.
-    sizes = np.abs(table[0])
-    flat, places = np.nonzero(np.maximum(sizes[:, 1:], sizes[:, :-1]) < _FLAT * np.abs(c).sum(axis=1, keepdims=True))
-    if len(flat):
-        starts: Array = places.astype(np.float64) * _CELL
-        fine = _CELL / _FINER
-        t = starts[:, None] + fine * np.arange(_FINER + 1)
-        again = np.stack(_evaluated(np.repeat(c[flat], _FINER + 1, axis=0), t.ravel())).reshape(2, *t.shape)
-        more_rows, more_low, more_high = _steps(c, flat, starts, fine, again)
-        is_flat = np.zeros(sizes[:, 1:].shape, dtype=np.bool_)
-        is_flat[flat, places] = True
-        left = ~is_flat[rows, np.minimum((low / _CELL + 1e-6).astype(np.intp), _GRID - 1)]
-        rows = np.concatenate((rows[left], more_rows))
-        low, high = np.concatenate((low[left], more_low)), np.concatenate((high[left], more_high))
-    return rows, _settled(c[rows], low, high)
-
-
-def _steps(
-    c: NDArray[np.complex128], owners: NDArray[np.intp], starts: Array, step: float, table: Array
-) -> tuple[NDArray[np.intp], Array, Array]:
-    """Returns ranges in which a polynomial changes its sign once: whose they are, and their ends, [rad].
-
-    Args:
-        c: Polynomials, shape (N, DEGREE + 1).
-        owners: Which of them each row of the table is of, shape (m,).
-        starts: Where each row begins, shape (m,), [rad].
-        step: From place to place, [rad].
-        table: Values and slopes, shape (2, m, places).
-    """
-    before, after = table[:, :, :-1], table[:, :, 1:]
-    is_negative = before[0] < 0.0
-    crosses = is_negative != (after[0] < 0.0)
-    rows, places = np.nonzero(crosses)
-    low = starts[rows] + step * places
-    # Two roots within a step: both ends are on one side, and the way there leads to the other.
-    sign = np.where(is_negative, -1.0, 1.0)
-    twins, tops = np.nonzero(~crosses & (sign * before[1] < 0.0) & (sign * after[1] > 0.0))
-    picked, left = c[owners[twins]], starts[twins] + step * tops
-    bottom = _settled(picked * (1j * _HARMONICS), left, left + step)
-    deep = sign[twins, tops] * _evaluated(picked, bottom)[0] < _ROUNDING * np.abs(picked).sum(axis=1)
-    twins, left, bottom = owners[twins[deep]], left[deep], bottom[deep]
-    ends = np.concatenate((low + step, bottom, left + step))
-    return np.concatenate((owners[rows], twins, twins)), np.concatenate((low, left, bottom)), ends
-
-
-def _settled(c: NDArray[np.complex128], low: Array, high: Array) -> Array:
-    """Returns the root of each polynomial between two angles at which its signs differ, shape (R,), [rad]."""
-    above = _evaluated(c, high)[0] > 0.0
-    t = 0.5 * (low + high)
-    for _ in range(_NEWTON):
-        value, slope = _evaluated(c, t)
-        beyond = (value > 0.0) == above
-        high, low = np.where(beyond, t, high), np.where(beyond, low, t)
-        newton = t - value / np.where(slope == 0.0, 1.0, slope)
-        t = np.where((low <= newton) & (newton <= high), newton, 0.5 * (low + high))
-    return t
-
-
-def _evaluated(c: NDArray[np.complex128], t: Array) -> tuple[Array, Array]:
-    """Returns values and slopes of polynomials at an angle each, [rad], shape (R,)."""
-    powers = np.empty_like(c)
-    powers[:, 0] = 1.0
-    powers[:, 1:] = np.exp(1j * t)[:, None]
-    terms = c * np.multiply.accumulate(powers, axis=1)
-    return terms.real.sum(axis=1), -(terms.imag @ _HARMONICS)
 
 
 def _joint_angles(

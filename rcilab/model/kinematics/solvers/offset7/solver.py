@@ -1,4 +1,4 @@
-"""Solver for 7 axes with offsets at elbow and wrist, such as the Panda; the redundancy is joint 3."""
+"""Solver for 7 axes with offsets at elbow and wrist, such as Panda and xArm7; the redundancy is joint 3."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class OffsetSeven:
         self.envelope = Envelope(
             shoulder=geometry.shoulder,
             upper=hypot(geometry.upper, geometry.elbow),
-            fore=hypot(geometry.fore, geometry.elbow) + geometry.wrist,
+            fore=hypot(geometry.fore, geometry.bend) + abs(geometry.wrist),
             hand=geometry.hand,
         )
 
@@ -42,7 +42,7 @@ class OffsetSeven:
         return remainder(q[ELBOW], tau)
 
     def redundancy_angle_path(self, q: JointPath) -> Array:
-        """Returns the angles of joint 3, [rad], not wrapped: this joint makes no full turn."""
+        """Returns the angles of joint 3, [rad], not wrapped."""
         return q[:, ELBOW]
 
     def singularity(self, q: Sequence[float]) -> str | None:
@@ -65,7 +65,7 @@ class OffsetSeven:
         self, rotations: Array, positions: Array, psi: Array | None, start: JointVector
     ) -> tuple[JointPath, BranchEnd | None]:
         """Returns the joint angles along a path."""
-        angles = np.full(len(positions), start[ELBOW]) if psi is None else psi
+        angles = np.full(len(positions), start[ELBOW]) if psi is None else psi + _turns(start[ELBOW], psi[0])
 
         def solve(pose: Pose, angle: float) -> list[Angles]:
             return inverse_held(self.geometry, pose, angle, None)
@@ -74,6 +74,7 @@ class OffsetSeven:
 
     def solve_near(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
         """Returns the joint angles of a pose closest to those of the previous cycle, [rad]."""
+        psi += _turns(near[ELBOW], psi)
         return refine_near(self.geometry.chain, ELBOW, T_base_flange.rotation, T_base_flange.position, psi, near)
 
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
@@ -87,3 +88,8 @@ class _OffsetPose:
 
     def branches(self, psi: float) -> list[Angles]:
         return inverse_held(self._arm, self._pose, psi, self._near)
+
+
+def _turns(angle: float, psi: float) -> float:
+    """Returns the full turns, [rad], that bring psi within half a turn of an angle of joint 3."""
+    return tau * round((angle - psi) / tau)
