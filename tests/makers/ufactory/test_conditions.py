@@ -16,7 +16,7 @@ from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint, plan_line
 
 ARM = load_model("xArm6")
-AHEAD = ARM.home + [0.0, 0.9, 0.3, 0.0, 0.0, 0.0]
+AHEAD = ARM.home + [0.0, 0.9, -0.9, 0.0, 0.0, 0.0]
 GOAL = ARM.home + [0.6, 0.2, -0.3, 0.4, 0.2, -0.5]
 
 

@@ -144,8 +144,8 @@ def harmonics(arm: OffsetGeometry, rotations: Array, positions: Array, psi: Arra
     return fourier_coefficients(polynomial(arm, rotations, positions, psi, _ANGLES), DEGREE)
 
 
-def polynomial(arm: OffsetGeometry, rotations: Array, positions: Array, psi: Array, q7: Array) -> tuple[Array, Array]:
-    """Returns H0^2 - (1 - C^2) H1^2 and what divides it, each of shape (N, K), at K angles of joint 7, [rad]."""
+def polynomial(arm: OffsetGeometry, rotations: Array, positions: Array, psi: Array, q7: Array) -> Array:
+    """Returns H0^2 - (1 - C^2) H1^2, shape (N, K), at K angles of joint 7, [rad]."""
     theta = q7 + arm.offsets[6]
     c7, s7 = np.cos(theta), np.sin(theta)
     X, Y, Z = (rotations[:, :, i] for i in range(3))
