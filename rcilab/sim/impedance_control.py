@@ -17,6 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rcilab.core.arrays import Array, JointVector, Matrix, scalar
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.spatial import Pose, rotation_between
 from rcilab.model.dynamics.rigid_body import ToolTerms
 from rcilab.model.robot_model import RobotModel
@@ -26,6 +27,7 @@ from rcilab.sim.plant import Measurement
 NULL_FREQUENCY = 5.0  # [rad/s] of the spring that holds the elbow of a 7-axis arm; soft, a tuning value
 NULL_DAMPING = 2.0 * DAMPING_RATIO * NULL_FREQUENCY  # [1/s]
 _NULL_STIFFNESS, _NULL_DAMPING = scalar(NULL_FREQUENCY**2), scalar(NULL_DAMPING)  # [1/s^2], [1/s]
+_CYCLE = scalar(CYCLE_TIME)  # [s]
 _DAMPED_INVERSE = 1e-4 * np.eye(6)  # [1/kg] Keeps feed-forward finite at a singularity; error elsewhere below 0.1 %.
 
 
@@ -51,9 +53,9 @@ def joint_impedance(
     """
     body, q, dq = model.driven_body, measured.q, measured.dq
     K = np.array(stiffness)
-    tau = (damper or ModalDamping()).torque(
-        lambda: design_damping(body.mass_inverse(q), np.diag(K)), K * (q_c - q), dq_c - dq
-    )
+    # The reference is that of the end of this millisecond; q and dq are those of its beginning.
+    off, slip = q_c - _CYCLE * dq_c - q, dq_c - _CYCLE * ddq_c - dq
+    tau = (damper or ModalDamping()).torque(lambda: design_damping(body.mass_inverse(q), np.diag(K)), K * off, slip)
     tau += body.motion_torque(q, dq, ddq_c)
     return tau if model.description.damping is None else tau + model.description.damping * dq_c
 

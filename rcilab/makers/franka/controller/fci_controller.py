@@ -283,7 +283,8 @@ class FciController:
         refusal = MOVE_REFUSALS.get(self.phase)
         if refusal is not None:
             return refusal
-        motion = motion_of(request, self.version, self.settings)
+        is_ideal = self.arm.plant.kind == "ideal"
+        motion = motion_of(request, self.version, self.settings, follows_exactly=is_ideal)
         deviations = PoseDeviations.of(request)
         if motion is None or not deviations.are_valid:
             return Status.INVALID_ARGUMENT

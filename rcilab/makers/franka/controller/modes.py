@@ -42,6 +42,8 @@ class MotionKind(NamedTuple):
     generator: MoveGenerator
     mode: MotionMode
     """Of the virtual arm."""
+    is_stiff: bool
+    """Whether the joints have the stiffness after power-up: rcilab's states then name what is commanded."""
 
     @property
     def reported_generator(self) -> MotionGeneratorMode:
@@ -51,13 +53,18 @@ class MotionKind(NamedTuple):
     @property
     def reported_controller(self) -> ControllerMode:
         """The controller in rcilab's states."""
-        return _CONTROLLERS[self.mode.law][self.mode.is_cartesian]
+        return _CONTROLLERS[ControlLaw.POSITION if self.is_stiff else self.mode.law][self.mode.is_cartesian]
 
 
-def motion_of(request: Move, version: FciVersion, settings: Settings) -> MotionKind | None:
+def motion_of(request: Move, version: FciVersion, settings: Settings, *, follows_exactly: bool) -> MotionKind | None:
     """Returns the motion of a Move; None if its modes are not of this version, or do not go together.
 
-    With the stiffness after power-up the joints are on their servos: the internal impedance is that stiff.
+    Args:
+        request: The request.
+        version: The version of the interface.
+        settings: The client's settings.
+        follows_exactly: Whether the joints are on their servos, and yield to nothing, with the stiffness after
+            power-up.
     """
     controllers, generators = tuple(MoveController), version.generators
     if request.controller_mode >= len(controllers) or request.motion_generator_mode not in tuple(generators):
@@ -71,9 +78,10 @@ def motion_of(request: Move, version: FciVersion, settings: Settings) -> MotionK
             return None
         kind, velocity = CommandKind.JOINT_GOALS, request.largest_velocity
     law = ControlLaw.TORQUE
+    is_stiff = controller is MoveController.JOINT_IMPEDANCE and settings.joint_stiffness == JOINT_STIFFNESS
     if controller is MoveController.JOINT_IMPEDANCE:
-        is_stiff = settings.joint_stiffness == JOINT_STIFFNESS
-        law = ControlLaw.POSITION if is_stiff else ControlLaw.JOINT_IMPEDANCE
+        law = ControlLaw.POSITION if is_stiff and follows_exactly else ControlLaw.JOINT_IMPEDANCE
     elif controller is MoveController.CARTESIAN_IMPEDANCE:
         law = ControlLaw.CARTESIAN_IMPEDANCE
-    return MotionKind(controller, generator, MotionMode(law, kind, has_free_elbow=True, goal_velocity=velocity))
+    mode = MotionMode(law, kind, has_free_elbow=True, goal_velocity=velocity)
+    return MotionKind(controller, generator, mode, is_stiff)

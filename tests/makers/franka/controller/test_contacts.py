@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rcilab.core.spatial import Pose
+from rcilab.makers.franka.bounds import JOINT_STIFFNESS
 from rcilab.makers.franka.controller.fci_controller import FciController
 from rcilab.makers.franka.controller.phases import Phase
 from rcilab.makers.franka.controller.reporter import columns_of
@@ -146,3 +147,25 @@ def test_while_an_impedance_pushes_its_torques_are_in_the_state(controller: FciC
     assert desired == pytest.approx(measured.tau - gravity, abs=0.05)
     if generator == 0:
         assert desired == pytest.approx(300.0 * (np.array(q) - measured.q), abs=0.1)
+
+
+def test_the_joints_have_the_stiffness_after_power_up(controller: FciController) -> None:
+    yielded = []
+    for stiffness in (JOINT_STIFFNESS, tuple(0.999 * value for value in JOINT_STIFFNESS)):
+        controller.reset(MODEL.home)
+        controller.step()
+        assert controller.set(SetJointImpedance(stiffness))[0] is Status.SUCCESS
+        assert controller.begin_move(Move(0, 0, FAR, FAR)) is Status.MOTION_STARTED
+        q = tuple(MODEL.home.tolist())
+        controller.arm.plant.push((10.0, 5.0, -10.0, 0.0, 0.0, 0.0))
+        for k in range(SETTLED):
+            last = k == SETTLED - 1
+            packet = CommandPacket(k, q, ZERO, (0.0,) * 16, (0.0,) * 6, (0.0, -1.0), False, last, ZERO, False)
+            controller.receive(packet)
+            controller.step()
+        signals = controller.arm.signals
+        yielded.append(signals.measured.q - q)
+        assert yielded[-1] == pytest.approx(signals.tau_ext / np.array(stiffness), abs=2e-5)
+        assert np.abs(yielded[-1]).max() > 5e-4
+        push(controller, (0.0,) * 6)
+    assert yielded[1] == pytest.approx(yielded[0], rel=0.01, abs=1e-5)
