@@ -48,7 +48,7 @@ TORQUE_SHARE = 0.95  # Largest part of the torque limits that is commanded, so t
 SETTLING = 300  # Cycles that torque mode stays at the end: two time constants of the compliant arm.
 
 Commander: TypeAlias = Callable[[JointPath, int, RobotState], Command]
-"""`(rows, k, state) -> command`: what to send for row k of rows, shape (N, n), [rad]."""
+"""`(rows, k, state) -> command`: what to send for row k of rows, shape (N, n), [rad]; beyond the last one, for it."""
 
 
 class MotionExecutor:
@@ -192,7 +192,7 @@ class MotionStream:
         # With further rows to follow, the arm is held at the last one.
         self.held = row - last if row > last and (self._holds or self._next is not None) else 0
         is_over = not self._holds and self._next is None and row >= last + self._settling
-        command = self._command(rows, min(row, last), state)
+        command = self._command(rows, row, state)
         return replace(command, finished=True) if is_over else command
 
     def omit_arm_angle(self) -> None:
@@ -226,10 +226,7 @@ class MotionStream:
 
         For torque mode, which has no commanded position: the reference stops, and the torques make the arm follow it.
         """
-        rows, k = self._rows, min(self.cycle - self._first, len(self._rows) - 1)
-        before, earlier = rows[max(k - 1, 0)], rows[max(k - 2, 0)]
-        dq, ddq = (rows[k] - before) / CYCLE_TIME, (rows[k] - 2.0 * before + earlier) / CYCLE_TIME**2
-        stop = plan_stop(self._model.limits.joint, rows[k], dq, ddq).q
+        stop = plan_stop(self._model.limits.joint, *_reference(self._rows, self.cycle - self._first)).q
         self._rows, self._first, self._holds, self._next = stop, self.cycle, False, None
 
 
@@ -246,12 +243,12 @@ def build_commander(mode: Mode, model: RobotModel) -> Commander:
 
 
 def _angles(rows: JointPath, k: int, state: RobotState) -> Command:
-    return JointPosition(rows[k])
+    return JointPosition(rows[min(k, len(rows) - 1)])
 
 
 def _poses(model: RobotModel, *, has_psi: bool) -> Commander:
     def command(rows: JointPath, k: int, state: RobotState) -> Command:
-        q = rows[k]
+        q = rows[min(k, len(rows) - 1)]
         try:
             psi = model.arm_angle(q) if has_psi else None
         except KinematicsError:  # At a singularity; the controller holds its own.
@@ -281,9 +278,10 @@ def _torques(model: RobotModel) -> Commander:
 
 
 def _reference(rows: JointPath, k: int) -> tuple[Array, Array, Array]:
-    """Returns position, velocity and acceleration of row k by backward differences, with standstill before row 0.
+    """Returns position, velocity and acceleration of row k by backward differences, with standstill before and after.
 
     The first torque is then zero, as the torque rate requires.
     """
-    now, before, earlier = rows[k], rows[max(k - 1, 0)], rows[max(k - 2, 0)]
+    last = len(rows) - 1
+    now, before, earlier = (rows[min(max(row, 0), last)] for row in (k, k - 1, k - 2))
     return now, (now - before) / CYCLE_TIME, (now - 2.0 * before + earlier) / CYCLE_TIME**2

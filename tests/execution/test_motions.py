@@ -90,6 +90,15 @@ def test_a_callback_runs_to_its_end_in_every_mode(robot, mode):
         assert np.abs(run.dq[:, 6]).max() > 0.01
 
 
+def test_a_plan_in_torque_mode_settles_at_its_goal():
+    """With the acceleration of the last row for ever after, it would drift off by half a degree."""
+    goal = HOME + np.array([0.4, 0.2, -0.3, 0.3, 0.2, -0.2, 0.4])
+    with simulate(MODEL) as robot:
+        robot.power_on()
+        run = robot.execute(plan_joint(MODEL, HOME, goal, speed=0.6, law="torque_rate_limited"), mode="torque")
+        assert np.abs(run.goal_error).max() < np.deg2rad(0.1)
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_a_stop_in_any_mode_is_no_fault_and_the_next_motion_runs(robot, mode):
     good = swing(mode, 0.4)
