@@ -11,18 +11,25 @@ from rcilab.core.condition import Condition, Signal
 from rcilab.motion.joint import JOINT_LAWS
 from rcilab.motion.motion import Motion
 
+_LARGE = 1e6
 _STANDSTILL = 1e-6  # [rad/s] A motion whose fitted curve starts more slowly starts at standstill.
 
 
 def share(ratio: float) -> str:
     """Returns the used part of a bound as text: in percent, or as a factor far beyond it."""
-    return f"{100.0 * ratio:.1f} %" if ratio < 10.0 else f"{ratio:.0f} x"
+    return f"{100.0 * ratio:.1f} %" if ratio < 10.0 else f"{factor_text(ratio)} x"
+
+
+def factor_text(ratio: float) -> str:
+    """Returns a factor as text: whole, or with an exponent from a million on."""
+    return f"{ratio:.0f}" if ratio < _LARGE else f"{ratio:.3g}"
 
 
 def with_degrees(angle: float, text: str) -> str:
     """Returns an angle in radians, as in `text`, and in degrees."""
     angle_deg = degrees(angle)
-    shown = f"{angle_deg:.2f}" if abs(angle_deg) >= 0.005 or angle_deg == 0.0 else f"{angle_deg:.2g}"
+    is_usual = 0.005 <= abs(angle_deg) < _LARGE or angle_deg == 0.0
+    shown = f"{angle_deg:.2f}" if is_usual else f"{angle_deg:.2g}"
     return f"{text} rad ({shown}°)"
 
 

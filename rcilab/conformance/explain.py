@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import TYPE_CHECKING
 
-from rcilab.conformance.advice import with_degrees
+from rcilab.conformance.advice import factor_text, with_degrees
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, translate
 from rcilab.core.clearance import FLOOR, TOOL
 from rcilab.core.condition import Condition
@@ -165,8 +165,12 @@ def _describe_nearest(row: ConditionResult, writer: _Writer) -> str:
 def _describe_value(violation: Violation, writer: _Writer) -> str:
     row = violation.condition
     place, quantity = explain_place(violation, writer.language), explain_quantity(row, writer.language)
+    if violation.reported:
+        return writer.translate("fact.reported", place=place, quantity=quantity, reported=violation.reported)
     if row.signal == "frame":
         return writer.translate("fact.frame", place=place, quantity=quantity)
+    if math.isnan(violation.value):
+        return writer.translate("fact.not_finite", place=place, quantity=quantity)
     value, bound = _amounts(row, violation.value, violation.bound, writer)
     if row.signal == "elbow_sign":
         return writer.translate("fact.elbow_sign", place=place, quantity=quantity, value=value)
@@ -212,7 +216,9 @@ def explain_place(found: ConditionResult | Violation, language: Language = "en")
     if found.links is not None:
         first, second = (_link(number, _Writer(language)) for number in found.links)
         return translate(language, "place.pair", first=first, second=second)
-    return translate(language, f"place.{'joint' if row.is_per_joint else row.location(found.joint)}", axis=axis)
+    return translate(
+        language, f"place.{'joint' if row.is_per_joint and found.joint else row.location(found.joint)}", axis=axis
+    )
 
 
 def explain_quantity(row: Condition, language: Language = "en") -> str:
@@ -291,4 +297,4 @@ def _in_unit(row: Condition, value: float, text: str, writer: _Writer) -> str:
 def _share(ratio: float, writer: _Writer) -> str:
     if ratio < _FACTOR_FROM:
         return writer.translate("share.percent", number=f"{100.0 * ratio:.1f}")
-    return writer.translate("share.times", number=f"{ratio:.0f}")
+    return writer.translate("share.times", number=factor_text(ratio))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -33,7 +34,7 @@ class ConditionResult:
     condition: Condition
     """The condition, with quantity, formula and source."""
     value: float
-    """The worst value, in the condition's unit."""
+    """The worst value, in the condition's unit; NaN: not a number, or not in the record."""
     bound: float
     """The bound on the side of the worst value."""
     ratio: float
@@ -109,6 +110,8 @@ class ConditionResult:
     def texts(self) -> tuple[str, str, str]:
         """Worst value, bound and used part as text; a value at an end that is small within its tolerance is 0."""
         used = share(self.ratio) if self.has_share else ""
+        if math.isnan(self.value):
+            return "-", f"{self.bound:.4g}", ""
         if self.condition.signal == "position":
             return f"{self.displayed[0]:.4g}", "0", used
         if self.condition.stage == "throughout":
@@ -143,6 +146,7 @@ class Violation:
         ratio: As in `ConditionResult`; 1 is the bound.
         advice: Remedy.
         links: The two links of the worst distance; None for other conditions.
+        reported: What the controller reported, where a record lacks the value; otherwise "".
     """
 
     condition: Condition
@@ -165,6 +169,8 @@ class Violation:
     """Remedy."""
     links: LinkPair | None = None
     """The two links of the worst distance; None for other conditions."""
+    reported: str = ""
+    """What the controller reported, where a record lacks the value; "" where there is one. It is in English."""
 
     @property
     def fault(self) -> FaultCode | None:
@@ -197,6 +203,10 @@ class Violation:
 
     def _describe_value(self) -> str:
         row = self.condition
+        if self.reported:
+            return f"{row.quantity}: the controller reported: {self.reported}"
+        if math.isnan(self.value):
+            return f"{row.quantity} is not a finite number"
         value, bound = format_pair(self.value, self.bound)
         if row.stage != "throughout":
             return f"{row.quantity} is {value} {row.unit}, not 0 within {abs(self.bound):.4g} {row.unit}"

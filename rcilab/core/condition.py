@@ -106,9 +106,12 @@ class Condition:
         return self.order > 0 and self.stage == "throughout"
 
     def location(self, axis: int) -> str:
-        """Returns the part of the arm that the value belongs to: "joint 2", "tool", "elbow", "links", "network"."""
+        """Returns the part of the arm that the value belongs to: "joint 2", "tool", "elbow", "links", "network".
+
+        Axis 0 of a condition on joints: "joints", where it is not known which.
+        """
         if self.is_per_joint:
-            return f"joint {axis}"
+            return f"joint {axis}" if axis else "joints"
         return _LOCATIONS.get(self.signal, "tool")
 
     def __repr__(self) -> str:

@@ -266,6 +266,7 @@ class ClientMotions:
             target=self._facts.url,
             plant=self._facts.plant,
             mode=event["mode"],
+            commands=str(event.get("commands", "")),
             started_ns=event["wall_ns"],
             client=event["client"],
             settings=event["settings"],

@@ -80,7 +80,9 @@ class ClientRecorder:
             if part.end is not None:
                 if self._part == 0 and self._file is None and motion.number != self._failed and not part.skipped:
                     why = part.end.stopped or "no command was played"
-                    self._show("not_recorded", f"motion {motion.number}, {motion.setup.mode}, is not recorded: {why}")
+                    self._show(
+                        "not_recorded", f"motion {motion.number}, {motion.setup.motion_kind}, is not recorded: {why}"
+                    )
                 self._finish(part.end, stopped=part.end.stopped)
         except RcilabError as error:
             file, self._file, self._failed = self._file, None, motion.number
@@ -108,7 +110,7 @@ class ClientRecorder:
     def _open(self, motion: ClientMotion, *, is_continued: bool) -> RunFile:
         stamp = time.strftime("%Y%m%d-%H%M%S", time.localtime(motion.setup.started_ns * 1e-9))
         suffix = f"-part{self._part + 1}" if self._part else ""
-        name = f"{stamp}-{motion.number:03d}-{motion.model.name}-{motion.setup.mode}{suffix}"
+        name = f"{stamp}-{motion.number:03d}-{motion.model.name}-{motion.setup.motion_kind}{suffix}"
         self._written = 0
         self._is_continued = is_continued
         for copy in count(1):  # Another controller may record in this folder, too.

@@ -52,7 +52,7 @@ def report_on_client(run: Run, end: MotionEnd | None = None, name: str = "motion
     received = answered if end is None else end.received
     late = int(run.cycles["late"].max(initial=0)) if end is None else end.late
     counts = f"{received} commands, {late} late; {missed} cycles without one"
-    line = f"{name}, {run.setup.mode}, {run.duration:.3f} s, {stopped}{nearest}; {counts}"
+    line = f"{name}, {run.setup.motion_kind}, {run.duration:.3f} s, {stopped}{nearest}; {counts}"
     lines = [line, "", *(f"Stopped: {part}" for part in _parts(reason)), ""]
     if report is not None:
         lines += [*(f"Note: {note}" for note in report.motion.notes), str(report), ""]

@@ -20,7 +20,7 @@ def fact_rows(run: Run, text: Text) -> list[list[str]]:
     setup, report = run.setup, run.report
     rows = [
         ("started", setup.started),
-        ("target", " · ".join(part for part in (setup.target, setup.plant, setup.mode) if part)),
+        ("target", " · ".join(part for part in (setup.target, setup.plant, setup.motion_kind) if part)),
         ("duration", text("facts.cycles", duration=run.duration, cycles=len(run.cycles))),
         ("ended", _ended(run, text)),
         ("health", _health(run, text)),

@@ -24,12 +24,22 @@ class Setup:
     """Plant of a virtual controller: "ideal" or "mujoco"."""
     mode: str = ""
     """Control mode, such as "joint_position"."""
+    commands: str = ""
+    """What was commanded, such as "joint_velocity" or "cartesian_velocity", where a virtual controller recorded it."""
     started_ns: int = 0
     """Start of the run, nanoseconds since 1970 (UTC); 0: not known."""
     client: str = ""
     """Address of the program that commanded it, where a virtual controller recorded the run; "" for rcilab itself."""
     settings: Mapping[str, Any] = field(default_factory=dict[str, Any])
     """Settings of the controller in force, in SI units, where it recorded the run."""
+
+    @property
+    def motion_kind(self) -> str:
+        """The mode, or what was commanded if that is not what the mode is named after, with the impedance."""
+        usual = f"{self.mode.split('_')[0]}_position"
+        if self.commands in ("", usual) or self.mode == "torque":
+            return self.mode
+        return f"{self.commands}-{self.mode}" if self.mode.endswith("impedance") else self.commands
 
     @property
     def started(self) -> str:

@@ -13,6 +13,7 @@ from rcilab.conformance.advice import with_degrees
 from rcilab.conformance.check import check_commands, check_torques
 from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.pose_validation import find_frame_error
+from rcilab.conformance.refusal import with_refusal
 from rcilab.conformance.signals import Record
 from rcilab.conformance.standstill import resolution
 from rcilab.conformance.start import StartState
@@ -21,7 +22,6 @@ from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.cycle_log import RATE_FIELDS, state_cycles
 from rcilab.core.errors import PlanningError, UsageError
-from rcilab.core.fault import name_faults
 from rcilab.core.state import COMPLIANT_MODES, MODES, Mode, require_mode
 from rcilab.model.robot_model import require_model
 from rcilab.motion.differences import derivatives_from_differences
@@ -29,9 +29,11 @@ from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.motion import Motion
 from rcilab.motion.stop import plan_stop
 from rcilab.recording.playout import played_commands, played_span
+from rcilab.recording.refused_command import angles_of_refused, explain_stop
 
 if TYPE_CHECKING:
     from rcilab.conformance.report import Report
+    from rcilab.core.condition import Signal
     from rcilab.core.safety_box import SafetyBox
     from rcilab.model.robot_model import RobotModel
     from rcilab.recording.run import Run
@@ -39,8 +41,9 @@ if TYPE_CHECKING:
 _STILL, _STEADY = 1e-4, 1e-2  # [rad/s], [rad/s^2] As the tolerance of a check at the end of a motion.
 _FADE_TIME = 0.5  # [s] From full speed to standstill within the limits of every arm and its tool.
 _FADE_SHARE = 0.2  # Of the limits of the joints, for a shorter one.
-_LARGEST = 1e100  # [rad], [N m] Of commands, also of one that is not a number: their differences remain finite.
+_LARGEST = 1e100  # [rad], [N m] Of commands: their differences remain finite.
 _LONGEST_GAP = 256  # Between two numbers of a client that counts on; no controller bridges more.
+_TOOL_FIELDS, _JOINT_FIELDS = ("command_pose", "command_twist"), ("command", "command_dq", "command_goal")
 _FARTHEST = 1e6  # [m] Of commanded positions; out of any arm's reach.
 
 
@@ -52,6 +55,8 @@ class SentCommands:
     """Joint angles as sent, or of the poses that were sent; a command that did not arrive is interpolated."""
     was_refused: bool = False
     """Whether a pose follows that has no joint angles: it is not one, out of reach or singular."""
+    not_finite: int = 0
+    """The joint, from 1, for which a number follows that is not finite; 0: none."""
 
 
 def sent_motion(run: Run) -> Motion:
@@ -74,8 +79,8 @@ def read_sent(run: Run) -> SentCommands:
     cycles = run.cycles
     is_played = run.has_playout
     if is_played and _has_rates(cycles):
-        return SentCommands(motion=_followed(cycles))
-    of_poses = run.setup.mode.startswith("cartesian") or not np.isnan(cycles["command_pose"]).all()
+        return _followed(run)
+    of_poses = recorded_mode(run).startswith("cartesian") or not np.isnan(cycles["command_pose"]).all()
     numbers = cycles["command_pose"].reshape(-1, 16) if of_poses else cycles["command"]
     sent = np.asarray(~np.isnan(numbers).all(axis=1), dtype=np.bool_)
     if is_played and run.setup.mode != "torque":
@@ -87,14 +92,16 @@ def read_sent(run: Run) -> SentCommands:
         has_torques = np.isfinite(cycles["command_tau"]).any()
         what = "torques were sent, which have no path" if has_torques else "nothing was sent"
         raise _empty(run, f"in this run {what}: only joint angles and poses of the tool can be checked")
-    q = _angles_of_poses(run, rows) if of_poses else _finite(cycles["command"][rows])
-    was_refused = len(q) < len(rows)
+    q, not_finite = (_angles_of_poses(run, rows), 0) if of_poses else _up_to_finite(cycles["command"][rows])
+    was_refused = not not_finite and len(q) < len(rows)
     if not len(q):
-        return SentCommands(motion=Motion.from_cycles(cycles["q_c"][:1]), was_refused=True)
+        motion = Motion.from_cycles(cycles["q_c"][:1])
+        return SentCommands(motion=motion, was_refused=was_refused, not_finite=not_finite)
     index = _without_pauses(index[: len(q)], q) if is_played else index[: len(q)]
     motion = Motion.from_cycles(_fill_gaps(index, q), period)
     lost = int(index[-1]) + 1 - len(index)
-    return SentCommands(motion=replace(motion, notes=_note_missing(lost)), was_refused=was_refused)
+    motion = replace(motion, notes=_note_missing(lost))
+    return SentCommands(motion=motion, was_refused=was_refused, not_finite=not_finite)
 
 
 def check_sent(
@@ -119,7 +126,22 @@ def check_sent(
         UsageError: Nothing was commanded.
     """
     model = with_soft_limits(require_model(run.model), run) if model is None else require_model(model)
-    return _explain_stop(_check(run, model, run.setup.safety_box if box is None else box, distance, mode), run)
+    box = run.setup.safety_box if box is None else box
+    report = _check(run, model, box, distance, mode)
+    if not (run.has_playout and run.faults and report.ok):
+        return report
+    beside = _check_beside_torques(run, model, box, distance)
+    return explain_stop(report, run, model) if beside is None or beside.ok else beside
+
+
+def _check_beside_torques(
+    run: Run, model: RobotModel, box: SafetyBox | None, distance: ClearanceLimit | None
+) -> Report | None:
+    """Returns the check of the motion that a client commanded along with torques; None without one."""
+    fields = (*_TOOL_FIELDS, *_JOINT_FIELDS)
+    if recorded_mode(run) != "torque" or not any(bool(np.isfinite(run.cycles[name]).any()) for name in fields):
+        return None
+    return _check(replace(run, setup=replace(run.setup, mode="joint_position")), model, box, distance, None)
 
 
 def _check(
@@ -127,9 +149,10 @@ def _check(
 ) -> Report:
     recorded = recorded_mode(run)
     if recorded == "torque":
-        motion, torques = sent_torques(run)
+        motion, torques, not_finite = _read_torques(run)
         motion, start = _in_progress(motion) if run.truncated else (_with_duration(motion, run), None)
-        return check_torques(motion, torques[-len(motion) :], model, start=start, box=box, distance=distance)
+        report = check_torques(motion, torques[-len(motion) :], model, start=start, box=box, distance=distance)
+        return _with_broken(report, model, "torque", not_finite)
     sent = read_sent(run)
     motion = sent.motion
     record = Record(was_stopped=bool(run.stopped or run.faults or not run.is_complete), refused_pose=sent.was_refused)
@@ -138,12 +161,14 @@ def _check(
         motion: Motion, record: Record, start: JointVector | StartState | None, note: tuple[str, ...] = ()
     ) -> Report:
         motion = replace(motion, notes=(*motion.notes, *note))
-        return check_commands(motion, model, record, start=start, box=box, distance=distance, mode=mode or recorded)
+        given = mode or recorded
+        report = check_commands(motion, model, record, start=start, box=box, distance=distance, mode=given)
+        return _with_broken(report, model, "joint", sent.not_finite)
 
     if run.truncated:
         motion, state = _in_progress(motion)
         return check_from(motion, record, state)
-    motion = _with_duration(motion, run)
+    motion = motion if sent.not_finite else _with_duration(motion, run)
     is_compliant = recorded in COMPLIANT_MODES
     if not run.has_playout:
         return check_from(motion, record, None if is_compliant else run.q_c[0])
@@ -168,9 +193,21 @@ def with_soft_limits(model: RobotModel, run: Run) -> RobotModel:
 
 
 def recorded_mode(run: Run) -> Mode:
-    """Returns the mode of a run; joint_position where it does not name one."""
-    mode = run.setup.mode
-    return require_mode(mode) if mode in MODES else "joint_position"
+    """Returns the mode of a run; joint_position where it does not name one.
+
+    It is Cartesian where the tool was commanded: a maker may combine such commands with each of its control laws.
+    """
+    mode = require_mode(run.setup.mode) if run.setup.mode in MODES else "joint_position"
+    if mode == "torque" or not run.has_playout:
+        return mode
+    of_tool, of_joints = (
+        any(bool(np.isfinite(run.cycles[name]).any()) for name in names) for names in (_TOOL_FIELDS, _JOINT_FIELDS)
+    )
+    if of_tool == of_joints:
+        return mode
+    if mode in COMPLIANT_MODES:
+        return "cartesian_impedance" if of_tool else "joint_impedance"
+    return "cartesian_position" if of_tool else "joint_position"
 
 
 def sent_torques(run: Run) -> tuple[Motion, Array]:
@@ -183,6 +220,12 @@ def sent_torques(run: Run) -> tuple[Motion, Array]:
     Raises:
         UsageError: No torques were commanded.
     """
+    motion, torques, _ = _read_torques(run)
+    return motion, torques
+
+
+def _read_torques(run: Run) -> tuple[Motion, Array, int]:
+    """Returns what `sent_torques` does, up to the first torque that is not finite, and the joint of that, or 0."""
     rows = run.cycles
     is_sent = np.isfinite(rows["command_tau"]).all(axis=1)
     faulty = np.flatnonzero(rows["faults"])[:1]
@@ -194,12 +237,16 @@ def sent_torques(run: Run) -> tuple[Motion, Array]:
     sent = rows[is_sent]
     if not len(sent):
         raise _empty(run, "in this run no torques were sent")
-    last = max(sent["t"][-1:].tolist() + rows["t"][faulty].tolist())
+    tau, not_finite = _up_to_finite(sent["command_tau"])
+    if not len(tau):
+        return Motion.from_cycles(sent["q"][:1]), np.zeros((1, sent["q"].shape[1])), not_finite
+    sent = sent[: len(tau)]
+    last = max(sent["t"][-1:].tolist() + ([] if not_finite else rows["t"][faulty].tolist()))
     grid = sent["t"][0] + CYCLE_TIME * np.arange(round((last - sent["t"][0]) / CYCLE_TIME) + 1)
     q = np.stack([np.interp(grid, rows["t"], column) for column in rows["q"].T], axis=1)
     lost = round((sent["t"][-1] - sent["t"][0]) / CYCLE_TIME) + 1 - len(sent) if run.has_playout else 0
     motion = replace(Motion.from_cycles(q), notes=_note_missing(lost))
-    return motion, np.stack([np.interp(grid, sent["t"], column) for column in _finite(sent["command_tau"]).T], axis=1)
+    return motion, np.stack([np.interp(grid, sent["t"], column) for column in tau.T], axis=1), not_finite
 
 
 def _empty(run: Run, otherwise: str) -> UsageError:
@@ -208,19 +255,13 @@ def _empty(run: Run, otherwise: str) -> UsageError:
     return UsageError(f"there are no cycles in this run: {run.missing_end}" if is_lost else otherwise)
 
 
-def _explain_stop(report: Report, run: Run) -> Report:
-    """Returns a report with a note if the controller stopped the run for a commanded value, and the check would not."""
-    faults = {row.condition.fault for row in report.rows if not row.condition.is_measured}
-    blamed = [fault for fault in run.faults if fault in faults]
-    if not (run.has_playout and report.ok and blamed):
+def _with_broken(report: Report, model: RobotModel, signal: Signal, joint: int) -> Report:
+    """Returns a report with the violation of a command after the others that is not finite; as it is for joint 0."""
+    if not joint:
         return report
-    missed = int(run.cycles["missed"][: np.flatnonzero(run.cycles["faults"])[0] + 1].sum())
-    note = (
-        f"the controller stopped it for {name_faults(blamed)}, but its commands conform in the client's own order: it "
-        f"had counted {missed} cycle{'s' * (missed != 1)} without a command, and decides when the next one comes over "
-        "how many cycles that leads"
-    )
-    return replace(report, motion=replace(report.motion, notes=(*report.motion.notes, note)))
+    rows = (row.condition for row in report.rows if row.condition.signal == signal and row.fault is not None)
+    condition = min(rows, key=lambda row: row.order)
+    return with_refusal(report, condition, model.limits, report.motion.duration + CYCLE_TIME, joint=joint)
 
 
 def _is_first_refused(run: Run) -> bool:
@@ -306,18 +347,22 @@ def _has_rates(cycles: NDArray[np.void]) -> bool:
     return any(bool(np.isfinite(cycles[name]).any()) for name in RATE_FIELDS)
 
 
-def _followed(cycles: NDArray[np.void]) -> Motion:
-    """Returns the joint angles that the controller commanded, up to the last played command or a fault.
+def _followed(run: Run) -> SentCommands:
+    """Returns the joint angles that the controller commanded, up to the last played command, one it refused included.
 
     After the last goal, it has them up to the end of the motion.
     """
+    cycles = run.cycles
     played, faulty = np.flatnonzero(cycles["played"]), np.flatnonzero(cycles["faults"])
     first, end = (int(played[0]), int(played[-1]) + 1) if played.size else (0, 1)
     if np.isfinite(cycles["command_goal"]).any():
         end = len(cycles)
     if faulty.size:
         end = min(end, max(int(faulty[0]), first + 1))
-    return Motion.from_cycles(cycles["q_c"][max(first - 1, 0) : end])
+    q = cycles["q_c"][max(first - 1, 0) : end]
+    refused = angles_of_refused(run, q[-1])
+    q, not_finite = _up_to_finite(q if refused is None else np.concatenate((q, refused[np.newaxis])))
+    return SentCommands(motion=Motion.from_cycles(q), not_finite=not_finite)
 
 
 def _answered_order(
@@ -403,8 +448,12 @@ def _without_pauses(index: NDArray[np.intp], q: JointPath) -> NDArray[np.intp]:
     return np.concatenate((index[:1], index[0] + np.cumsum(steps)))
 
 
-def _finite(q: Array) -> JointPath:
-    return np.clip(np.where(np.isnan(q), _LARGEST, q), -_LARGEST, _LARGEST)
+def _up_to_finite(rows: Array) -> tuple[Array, int]:
+    """Returns the rows before the first one that is not finite, and the joint with the first such number, or 0."""
+    is_bad = ~np.isfinite(rows)
+    broken = np.flatnonzero(is_bad.any(axis=1))[:1]
+    good = np.clip(rows[: broken[0]] if broken.size else rows, -_LARGEST, _LARGEST)
+    return good, int(is_bad[broken[0]].argmax()) + 1 if broken.size else 0
 
 
 def _angles_of_poses(run: Run, rows: NDArray[np.intp]) -> JointPath:

@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Callable
 from operator import attrgetter
 from time import monotonic_ns, time_ns
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -46,6 +46,10 @@ _FARTHEST = 1024  # [rows] Whose commands may be added; then readers take the ro
 _LONGEST_QUEUE = 256  # Commands that may wait for a row: no queue of the arm is longer.
 
 
+_Answer: TypeAlias = tuple[Callable[..., None], int, Callable[[ArmCommand], Any]]
+"""The packer of some numbers of a command, their offset in a row, and what returns them."""
+
+
 class _Arrival(NamedTuple):
     """A command that arrived."""
 
@@ -66,7 +70,7 @@ class CycleCapture:
     """
 
     __slots__ = (  # It takes a microsecond less a cycle.
-        "_answer",
+        "_answers",
         "_arm",
         "_client",
         "_commands",
@@ -126,7 +130,7 @@ class CycleCapture:
         self._no_joints = np.full(n, math.nan).tobytes()
         self._no_answer = np.full(17 + n, math.nan).tobytes()
         self._no_rates = np.full(6 + 2 * n, math.nan).tobytes()
-        self._answer = self._find_answer(controller.arm.mode)
+        self._answers = self._find_answers(controller.arm.mode)
         self._modes: tuple[object, ...] = ()
         self._status = b""  # Faults and modes, packed: they rarely change.
         self._counters = ring.counters
@@ -200,7 +204,7 @@ class CycleCapture:
         """Adds a command to the row of the state that it answers, or to the next one without a command."""
         now = monotonic_ns()
         if not self._received:
-            self._answer = self._find_answer(self._arm.mode)
+            self._answers = self._find_answers(self._arm.mode)
         self._received += 1
         late, self._late = self._late, self._playout.late
         row, lateness = self._rows.get(command.number), _NAN
@@ -260,8 +264,8 @@ class CycleCapture:
     def _store(self, row: int, start: int, time_ns: int, lateness: float, command: ArmCommand) -> None:
         """Stores a command that has the number of its row, which begins at `start` in the memory."""
         _ANSWERED.pack_into(self._memory, start + self._stamps + 8, time_ns, lateness)
-        pack, offset, numbers_of = self._answer
-        pack(self._memory, start + offset, *numbers_of(command))
+        for pack, offset, numbers_of in self._answers:
+            pack(self._memory, start + offset, *numbers_of(command))
         self._commands[id(command)] = row
         if row < self._lowest:
             self._lowest = row
@@ -289,11 +293,16 @@ class CycleCapture:
                 return arrival
         return None
 
-    def _find_answer(self, mode: MotionMode) -> tuple[Callable[..., None], int, Callable[[ArmCommand], Any]]:
-        """Returns how a command of this mode is stored: the packer, its offset in a row, and its numbers."""
-        kind = CommandKind.TORQUES if mode.law is ControlLaw.TORQUE else mode.kind
-        name, count, numbers_of = _COLUMNS[kind]
-        return struct.Struct(f"<{count or self._ring.n}d").pack_into, self._offsets[name], numbers_of
+    def _find_answers(self, mode: MotionMode) -> tuple[_Answer, ...]:
+        """Returns how a command of this mode is stored: its torques, and the motion beside them."""
+        kinds = [CommandKind.TORQUES] if mode.law is ControlLaw.TORQUE else []
+        if mode.kind not in kinds:
+            kinds.append(mode.kind)
+        columns = [_COLUMNS[kind] for kind in kinds]
+        return tuple(
+            (struct.Struct(f"<{count or self._ring.n}d").pack_into, self._offsets[name], numbers_of)
+            for name, count, numbers_of in columns
+        )
 
     def _follow_motion(self, state: RobotState, is_following: bool) -> None:
         """Writes the event of a motion that begins or has ended."""
@@ -316,6 +325,7 @@ class CycleCapture:
                 "motion": self._motion,
                 "row": self._count,
                 "mode": state.controller_mode.name.lower(),
+                "commands": _KIND_NAMES[arm.mode.kind],
                 "client": self._client,
                 "wall_ns": time_ns(),
                 "tool": arm.model.T_flange_tool.as_row_major(),
@@ -399,6 +409,16 @@ def describe_parameters(parameters: ArmParameters) -> dict[str, Any]:
 def _pose_of(command: ArmCommand) -> tuple[float, ...]:
     return (*command.T_base_tool, command.psi if command.has_psi else math.nan)
 
+
+_KIND_NAMES = {
+    CommandKind.JOINT_ANGLES: "joint_position",
+    CommandKind.JOINT_VELOCITIES: "joint_velocity",
+    CommandKind.POSES: "cartesian_position",
+    CommandKind.TWISTS: "cartesian_velocity",
+    CommandKind.JOINT_GOALS: "joint_goal",
+    CommandKind.TORQUES: "torque",
+}
+"""As `Setup.commands` has them."""
 
 _COLUMNS: dict[CommandKind, tuple[str, int, Callable[[ArmCommand], Any]]] = {
     CommandKind.JOINT_ANGLES: ("command", 0, attrgetter("q")),

@@ -10,6 +10,7 @@ import pytest
 from rcilab.core.cycle_ring import CycleRing
 from rcilab.makers.franka.controller.fci_controller import FciController
 from rcilab.makers.franka.controller.phases import Phase
+from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.wire.command_packet import CommandPacket
 from rcilab.makers.franka.wire.requests import AsyncMove, Move
 from rcilab.makers.franka.wire.versions import VERSION_5, VERSION_10, FciVersion, Status
@@ -87,6 +88,58 @@ def test_the_record_has_velocities_and_goals_and_its_check_the_angles_that_follo
         way = height[1] - height[0] if generator == 3 else moved[6]
         assert way == pytest.approx(SPEED * 1e-3 * CYCLES / 2.0, rel=1e-3)
     assert check_sent(run).ok
+    ring.close()
+
+
+JUMP, NO_NUMBER = 0.05, float("nan")
+E = FrankaError
+STOPPED = [
+    ((0, 1), {"dq_c": (0.0,) * 6 + (JUMP,)}, E.JOINT_MOTION_GENERATOR_VELOCITY_DISCONTINUITY),
+    ((0, 1), {"dq_c": (NO_NUMBER,) * 7}, E.JOINT_POSITION_LIMITS_VIOLATION),
+    ((0, 3), {"O_dP_EE_c": (0.0, 0.0, JUMP, 0.0, 0.0, 0.0)}, E.CARTESIAN_MOTION_GENERATOR_VELOCITY_DISCONTINUITY),
+    ((0, 3), {"O_dP_EE_c": (NO_NUMBER,) * 6}, E.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME_FLAG),
+    ((0, 2), {"elbow_c": (0.0, 1.0)}, E.CARTESIAN_MOTION_GENERATOR_ELBOW_SIGN_INCONSISTENT),
+    ((0, 2), {"elbow_c": (NO_NUMBER, -1.0)}, E.CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION),
+    ((1, 0), {"q_c": (0.0,) * 7}, E.JOINT_MOTION_GENERATOR_VELOCITY_DISCONTINUITY),
+    ((2, 0), {"q_c": (0.0,) * 7}, E.JOINT_MOTION_GENERATOR_VELOCITY_DISCONTINUITY),
+    ((2, 4), {"tau_c": (0.0,) * 6 + (9.0,)}, E.CONTROLLER_TORQUE_DISCONTINUITY),
+]
+"""Controller and generator of a Move, what changes after 50 commands at standstill, and the error for it."""
+KINDS = {
+    (0, 1): "joint_velocity",
+    (0, 2): "cartesian_position",
+    (0, 3): "cartesian_velocity",
+    (1, 0): "joint_position-cartesian_impedance",
+    (2, 0): "torque",
+    (2, 4): "torque",
+}
+
+
+@pytest.mark.parametrize(("mode", "changed", "fault"), STOPPED)
+def test_a_motion_that_was_stopped_for_its_command_does_not_conform(
+    mode: tuple[int, int], changed: dict[str, tuple[float, ...]], fault: FrankaError
+) -> None:
+    controller, capture, motions, ring = recorded("FR3", VERSION_10)
+    q = tuple(controller.state.q_c.tolist())
+    pose = tuple(controller.model.forward(q).matrix.T.ravel().tolist())
+    still = packet(0, 1, 0.0, q, is_last=False)._replace(q_c=q, O_T_EE_c=pose, elbow_c=(q[2], -1.0), has_elbow=True)
+    assert controller.begin_move(AsyncMove(*mode, DEVIATION, DEVIATION, False, (0.5,) * 7)) is Status.MOTION_STARTED
+    for k in range(100):
+        command = still._replace(message_id=controller.cycle_number, **(changed if k >= 50 else {}))
+        controller.receive(command)
+        controller.step()
+        capture.write()
+    assert fault in controller.faults
+    part = motions.poll(is_last=True)[-1]
+    assert part.end is not None
+    setup = part.motion.setup
+    run = build_run(
+        part.cycles, plan=None, model=part.motion.model, setup=setup, realtime=False, stopped=part.end.stopped
+    )
+    report = check_sent(run)
+    assert fault in {violation.fault for violation in report.violations}
+    assert report.violations[0].time == pytest.approx(0.05, abs=2e-3)
+    assert setup.motion_kind == KINDS[mode]
     ring.close()
 
 
