@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from struct import unpack
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -91,6 +92,13 @@ class IoRequests:
                         signals.set_output(first + 8 * k + bit, bool(word >> bit & 1))
 
         return Act(run, sync)
+
+    def set_outputs(self, payload: bytes) -> Act:
+        """Sets outputs of the control box: a word, or two, and whether they wait for the motions before them."""
+        words = unpack(f">{len(payload) // 2}H", payload[: len(payload) // 2 * 2])
+        if not 1 <= len(words) <= 2:
+            raise InvalidValueError("outputs", payload.hex(" "), "must be one or two words")
+        return self.set_bits(words, 0, bool(payload[-1]) if len(payload) % 2 else True)
 
     def set_analog(self, signal: int, code: int, sync: bool) -> Act:
         """Sets an analog output."""
@@ -194,7 +202,7 @@ IO_HANDLERS: dict[Function, _Handler] = {
     Function.GET_INPUTS: lambda io, v: encode_values("H", io.controller.signals.box_inputs),
     Function.GET_ANALOG_1: lambda io, v: encode_values("H", io.controller.signals.analog_inputs[0]),
     Function.GET_ANALOG_2: lambda io, v: encode_values("H", io.controller.signals.analog_inputs[1]),
-    Function.SET_OUTPUTS: lambda io, v: io.set_bits(v[:2], 0, bool(v[-1]) if len(v) % 2 else True),
+    Function.SET_OUTPUTS: lambda io, v: io.set_outputs(v[0]),
     Function.SET_ANALOG_1: lambda io, v: io.set_analog(0, v[0], _sync(v, 1)),
     Function.SET_ANALOG_2: lambda io, v: io.set_analog(1, v[0], _sync(v, 1)),
     Function.SET_INPUT_FUNCTION: lambda io, v: io.set_function(io.controller.signals.input_functions, *v),

@@ -31,9 +31,9 @@ from rcilab.sim.arm_setup import ArmSetup
 
 WIDEST_BOUNDARY = (9999, -9999, 9999, -9999, 9999, -9999)  # [mm] As the client library has it before any report.
 TOOL_SPEED = 1.0  # [m/s] User manual, 10.
-_SENSITIVITY_STEP = 0.25
-"""How much of the arm's largest threshold a step of the collision sensitivity takes; rcilab's own choice: the maker
-publishes no forces. 1: the largest, 5: a fifth."""
+_SENSITIVITY_STEP = 0.2
+"""By which each step of the collision sensitivity lowers the thresholds, from the largest torques of the joints at 1 to
+a fifth at 5; rcilab's own choice: the maker publishes no forces."""
 
 RESETTING = frozenset(
     {
@@ -107,7 +107,7 @@ class Settings(ArmParameters):
                 cartesian_stiffness=base.cartesian_stiffness,
                 reduced_lower=base.joint_lower,
                 reduced_upper=base.joint_upper,
-                largest_thresholds=base.collision_thresholds,
+                largest_thresholds=tuple(arm.limits.joint.torque.tolist()),
             )
         )
 
@@ -228,7 +228,7 @@ def _apply_safety(settings: Settings, function: Function, values: tuple[Any, ...
 def _with_thresholds(settings: Settings) -> Settings:
     """Returns the settings with the thresholds of their collision sensitivity."""
     steps = settings.collision_sensitivity - 1
-    share = inf if steps < 0 else 1.0 - 0.8 * _SENSITIVITY_STEP * steps
+    share = inf if steps < 0 else 1.0 - _SENSITIVITY_STEP * steps
     return replace(settings, collision_thresholds=tuple(share * value for value in settings.largest_thresholds))
 
 

@@ -157,8 +157,7 @@ class XArmServer:
             return Reply()
         function = Function(request.function)
         try:
-            is_raw = function is Function.RS485
-            values = (request.payload,) if is_raw else decode_payload(function, request.payload)
+            values = decode_payload(function, request.payload)
         except DecodeError as error:
             self.controller.warn(UfactoryWarning.PARAMETER)
             self._log_refusal(function.name, f"W12: {error.problem}")

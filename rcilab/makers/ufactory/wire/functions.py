@@ -178,7 +178,6 @@ _LAYOUTS: dict[Function, tuple[str, ...]] = {
     Function.TOOL_READ_16: (">BH",),
     Function.TOOL_WRITE_32: (">BH|<f",),
     Function.TOOL_READ_32: (">BH",),
-    Function.SET_OUTPUTS: (">H", ">HB", ">2H", ">2HB"),
     Function.SET_ANALOG_1: (">H", ">HB"),
     Function.SET_ANALOG_2: (">H", ">HB"),
     Function.SET_INPUT_FUNCTION: ("2B",),
@@ -191,6 +190,10 @@ _LAYOUTS: dict[Function, tuple[str, ...]] = {
     Function.ANALOG_AT_POSITION: (">BH|<4f",),
     Function.SET_FEEDBACK: ("B",),
 }
+
+
+_PLAIN = (Function.RS485, Function.SET_OUTPUTS)
+"""Functions whose payload is passed on as it is: frames of a bus, and one or two words with an optional byte."""
 
 
 class _Layout:
@@ -222,6 +225,8 @@ def decode_payload(function: Function, payload: bytes) -> tuple[Any, ...]:
     Raises:
         DecodeError: It is shorter than every layout of the function.
     """
+    if function in _PLAIN:
+        return (payload,)
     layouts = _PAYLOADS.get(function, ())
     for layout in layouts:
         if layout.size <= len(payload):

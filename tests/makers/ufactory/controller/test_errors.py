@@ -1,0 +1,241 @@
+"""Each error and warning is raised by its condition, stops the arm, and is cleaned."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from rcilab.core.errors import UsageError
+from rcilab.makers.ufactory.controller.modes import Mode, State
+from rcilab.makers.ufactory.controller.xarm_controller import LARGEST_QUEUE
+from rcilab.makers.ufactory.wire.frame import STATUS_ERROR, STATUS_INVALID, STATUS_WARNING
+from rcilab.makers.ufactory.wire.functions import Function
+from rcilab.sim.arm_setup import ArmSetup
+from tests.makers.ufactory.controller.conftest import ALL, Q6, Arm
+
+NOTHING = (0.0,) * 4
+
+
+def press(arm: Arm) -> None:
+    arm.controller.press_button("estop")
+
+
+def open_input(arm: Arm) -> None:
+    arm.controller.press_button("gstop")
+
+
+def out_of_reach(arm: Arm) -> None:
+    arm.move_line((1500.0, 0.0, 300.0, 3.1, 0.0, 0.0))
+
+
+def beyond_the_range(arm: Arm) -> None:
+    arm.move_joints((Q6[0], Q6[1], 0.5, *Q6[3:]))
+
+
+def through_itself(arm: Arm) -> None:
+    arm.move_joints((0.2, 0.7, 0.0, 0.0, 1.9, 0.3))  # The wrist reaches the base.
+
+
+def fast_at_a_singularity(arm: Arm) -> None:
+    arm.move_joints((0.0, -0.5, -0.8, 0.0, 0.02, 0.0))
+    arm.run()
+    x, y, z, roll, pitch, yaw = arm.pose
+    arm.move_line((x, y, z, roll + 0.5, pitch, yaw), speed=900.0)
+
+
+def points_on_a_line(arm: Arm) -> None:
+    x, y, z, *rpy = arm.pose
+    values = (x, y + 30.0, z, *rpy, x, y + 60.0, z, *rpy, 100.0, 1000.0, 0.0, 50.0)
+    arm.call(Function.MOVE_CIRCLE, "16f3B", *values, 0, 0, 0)
+
+
+def leave_the_boundary(arm: Arm) -> None:
+    x, y, z, *rpy = arm.pose
+    bounds = (int(x) + 50, int(x) - 50, int(y) + 20, int(y) - 50, int(z) + 50, int(z) - 50)
+    arm.call(Function.SET_BOUNDARY, "6i", *bounds)
+    arm.call(Function.SET_FENCE, "B", 1)
+    arm.move_line((x, y + 40.0, z, *rpy))
+
+
+def fast_servo_targets(arm: Arm) -> None:
+    arm.ready(Mode.SERVO)
+    arm.call(Function.SERVO_JOINT, "10f", *(angle + 0.5 for angle in Q6), *NOTHING)
+
+
+def leave_the_reduced_range(arm: Arm) -> None:
+    narrow = [bound for angle in (*Q6, 0.0) for bound in (angle - 0.1, angle + 0.1)]
+    arm.call(Function.SET_REDUCED_JOINT_RANGE, "14f", *narrow)
+    arm.call(Function.SET_REDUCED_MODE, "B", 1)
+    arm.move_joints((Q6[0] + 0.2, *Q6[1:]))
+
+
+CAUSES: list[tuple[int, Callable[[Arm], None]]] = [
+    (1, press),
+    (2, open_input),
+    (21, out_of_reach),
+    (22, through_itself),
+    (23, beyond_the_range),
+    (23, leave_the_reduced_range),
+    (24, fast_at_a_singularity),
+    (25, points_on_a_line),
+    (35, leave_the_boundary),
+    (60, fast_servo_targets),
+]
+
+
+@pytest.mark.parametrize(("number", "cause"), CAUSES, ids=[cause.__name__ for _, cause in CAUSES])
+def test_an_error_is_raised_by_its_condition_and_stops_the_arm(
+    arm: Arm, number: int, cause: Callable[[Arm], None]
+) -> None:
+    cause(arm)
+    arm.run(until=lambda: arm.controller.error is not None)
+    assert arm.controller.error == number
+    assert arm.controller.reason
+    assert arm.state == State.STOPPED
+    assert arm.move_joints(Q6) & STATUS_ERROR
+    arm.run()
+    assert arm.controller.queued == 0
+    arm.controller.press_button("none")
+    arm.call(Function.SET_FENCE, "B", 0)
+    arm.call(Function.SET_REDUCED_MODE, "B", 0)
+    arm.ready()
+    assert arm.move_joints(Q6) == 0
+    arm.run()
+    np.testing.assert_allclose(arm.q, Q6, atol=1e-6)
+    assert arm.error == (0, 0)
+
+
+def test_an_emergency_stop_switches_the_motors_off_and_stays_while_it_is_pressed(arm: Arm) -> None:
+    press(arm)
+    arm.step()
+    assert arm.controller.enabled == 0
+    arm.call(Function.CLEAN_ERROR)
+    assert arm.error == (1, 0)
+    arm.controller.press_button("none")
+    arm.call(Function.CLEAN_ERROR)
+    assert arm.error == (0, 0)
+    arm.call(Function.SET_STATE, "B", 0)
+    assert arm.state == State.STOPPED, "the motors are off"
+
+
+def test_inside_the_boundary_the_arm_moves_and_outside_only_inwards(arm: Arm) -> None:
+    leave_the_boundary(arm)
+    arm.run()
+    assert arm.error[0] == 35
+    outside = arm.pose[1]
+    arm.ready()
+    x, y, z, *rpy = arm.pose
+    arm.move_line((x, y - 30.0, z, *rpy))
+    arm.run()
+    assert arm.error == (0, 0)
+    assert arm.pose[1] < outside - 25.0
+
+
+def blocked(sensitivity: int) -> Arm:
+    """Returns an arm in MuJoCo that moves against a push that it cannot overcome."""
+    arm = Arm(plant="mujoco")
+    arm.controller.set_up(ArmSetup(q=Q6))
+    arm.call(Function.SET_COLLISION_SENSITIVITY, "B", sensitivity)
+    arm.ready()
+    arm.move_joints((Q6[0] + 1.0, *Q6[1:]), speed=0.3)
+    arm.step(300)
+    arm.controller.arm.plant.push((0.0, -300.0, 0.0, 0.0, 0.0, 0.0))
+    return arm
+
+
+def test_a_collision_is_an_error() -> None:
+    arm = blocked(3)
+    arm.run(until=lambda: arm.controller.error is not None)
+    assert arm.controller.error == 31
+    assert "external torque" in str(arm.controller.reason)
+
+
+def test_a_drive_at_its_largest_torque_is_the_error_of_its_joint_and_switches_motors_off() -> None:
+    arm = blocked(0)
+    arm.run(until=lambda: arm.controller.error is not None)
+    assert arm.controller.error == 11
+    assert arm.controller.enabled == 0
+
+
+@pytest.mark.parametrize(
+    ("warning", "function", "code", "values"),
+    [
+        (12, Function.MOVE_JOINT, "10f", (*Q6, 0.0, 0.0, 10.0, 0.0)),
+        (12, Function.MOVE_JOINT, "10f", (*Q6, 0.0, float("nan"), 10.0, 0.0)),
+        (12, Function.MOVE_JOINT, "3f", Q6[:3]),
+        (12, Function.SET_COLLISION_SENSITIVITY, "B", (6,)),
+        (12, Function.SET_LOAD, "4f", (-1.0, 0.0, 0.0, 0.0)),
+        (12, Function.SET_TCP_OFFSET, "6f", (9000.0, 0.0, 0.0, 0.0, 0.0, 0.0)),
+        (12, Function.SET_BOUNDARY, "6i", (0, 100, 100, 0, 100, 0)),
+        (13, 250, "", ()),
+        (13, 99, "2f", (1.0, 2.0)),
+        (14, Function.GET_IK, "6f", (2000.0, 0.0, 0.0, 3.1, 0.0, 0.0)),
+    ],
+)
+def test_a_request_that_is_not_valid_is_a_warning_and_changes_nothing(
+    arm: Arm, warning: int, function: int, code: str, values: tuple[float, ...]
+) -> None:
+    settings, before = arm.controller.settings, arm.q
+    status, _ = arm.call(function, code, *values)
+    assert status & STATUS_WARNING
+    assert not status & STATUS_ERROR
+    assert arm.error == (0, warning)
+    assert arm.controller.settings is settings
+    arm.step(20)
+    assert (arm.q, arm.state) == (before, State.READY)
+    arm.call(Function.CLEAN_WARNING)
+    assert arm.error == (0, 0)
+
+
+def test_a_full_queue_is_a_warning(arm: Arm) -> None:
+    arm.call(Function.SET_STATE, "B", 3)
+    for _ in range(LARGEST_QUEUE):
+        assert arm.call(Function.SLEEP, "f", 0.001)[0] == 0
+    assert arm.call(Function.SLEEP, "f", 0.001)[0] & STATUS_WARNING
+    assert arm.error == (0, 11)
+    assert struct.unpack(">H", arm.call(Function.GET_COMMAND_COUNT)[1]) == (LARGEST_QUEUE,)
+
+
+def test_a_checked_pose_does_not_move_the_arm(arm: Arm) -> None:
+    before = arm.q
+    far = (2000.0, 0.0, 300.0, 3.1, 0.0, 0.0)
+    for pose, error in ((arm.pose, 0), (far, 40)):
+        _, payload = arm.call(Function.MOVE_LINE, "10f3B", *pose, 100.0, 1000.0, 0.0, -1.0, 0, 0, 1)
+        assert payload == bytes((0, 0, error))
+    arm.step(20)
+    assert (arm.q, arm.error) == (before, (0, 0))
+
+
+def test_the_hand_guides_the_arm_in_mode_2_and_it_stays_there() -> None:
+    arm = Arm(plant="mujoco")
+    arm.controller.set_up(ArmSetup(q=Q6))
+    arm.ready(Mode.TEACH)
+    with pytest.raises(UsageError, match="mode 2"):
+        arm.controller.guide(True)
+    arm.step(300)
+    np.testing.assert_allclose(arm.q, Q6, atol=2e-3)
+    arm.controller.arm.plant.push((0.0, 20.0, 0.0, 0.0, 0.0, 0.0))
+    arm.step(400)
+    arm.controller.arm.plant.push((0.0,) * 6)
+    arm.step(1500)
+    guided = arm.q
+    assert abs(guided[0] - Q6[0]) > 0.03
+    arm.ready()
+    arm.run()
+    np.testing.assert_allclose(arm.q, guided, atol=0.05)
+    assert arm.move_joints(Q6) == 0
+    arm.run()
+    np.testing.assert_allclose(arm.q, Q6, atol=2e-3)
+
+
+def test_switched_off_motors_hold_the_arm_by_its_brakes() -> None:
+    arm = Arm(plant="mujoco")
+    arm.controller.set_up(ArmSetup(q=Q6))
+    arm.ready()
+    arm.call(Function.MOTION_ENABLE, "2B", ALL, 0)
+    arm.step(500)
+    np.testing.assert_allclose(arm.q, Q6, atol=1e-3)
+    assert arm.call(Function.SET_BRAKE, "2B", 9, 0)[0] & STATUS_INVALID
