@@ -94,14 +94,14 @@ def connect(
     """Returns a session with the robot at an address. Nothing moves and no motor is switched.
 
     Tool and load are settings of the controller, which change what the arm does: they are sent only with `apply`.
-    Without it a warning reports in one sentence what differs from the model. The tool is known from the state. The load
-    is not: it is compared by the torques at standstill, which show 2 kg in most poses and may not show 0.5 kg; if they
-    cannot show the model's load, the warning reports that.
+    Without it a warning reports in one sentence what differs from the model. The tool is known from the state. Where
+    the load is not (RCI), it is compared by the torques at standstill, which show 2 kg in most poses and may not show
+    0.5 kg; if they cannot show the model's load, the warning reports that.
 
     Args:
         address: `rci://HOST:PORT`; `?udp_port=N` if the robot receives commands at another UDP port,
             `?client_port=M` if it sends states to another port; `?world_port=W` for `simulation`. `fci://HOST` for a
-            Franka arm.
+            Franka arm, `xarm://HOST` for one of UFACTORY.
         model: The arm, with its tool and load; None uses the arm that the controller reports. Without `apply`, the
             session's model has the controller's tool.
         timeout: Timeout of the connection, of the first state, and of every response, [s].
@@ -157,7 +157,8 @@ def open_session(
             model = load_model(driver.arm_name)
         if not apply:
             model = driver.with_tool(model)
-            _warn_of_other_load(driver, model)
+            if not driver.reports_load:
+                _warn_of_other_load(driver, model)
         if world is None and driver.simulation_address is not None:
             world = SimulationControl(*driver.simulation_address)
         exit_stack = ExitStack()

@@ -166,6 +166,8 @@ class Driver(Protocol):
     """Whether the controller holds its arm angle while none is sent; if not, the joints move as little as possible."""
     keeps_newest: bool
     """Whether `poll` returns the newest state only, so that those that arrive between two calls are missing."""
+    reports_load: bool
+    """Whether `with_tool` returns a model with the controller's load, too."""
     recovery_silence: float
     """Longest time for which `recover` may keep the whole process from running, [s]; 0: it does not."""
     on_states: Callable[[list[RobotState]], None]

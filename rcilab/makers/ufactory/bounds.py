@@ -28,3 +28,9 @@ SENSITIVITIES: Final = (0, 5)
 DEFAULT_SENSITIVITY: Final = 3  # Of both; rcilab's own choice, the maker's is that of the last `save_conf`.
 
 LONGEST_TOOL: Final = 2.0  # [m] Distance of a frame, or of a centre of mass, from the flange; rcilab's own bound.
+
+REPORT_PERIOD: Final = 0.005  # [s] Of the reports in real time, each of which a motion answers with a target.
+OUTPUTS: Final = (*(f"CO{k}" for k in range(8)), *(f"DO{k}" for k in range(8)))
+"""Digital outputs of the control box, by number."""
+INPUTS: Final = (*(f"CI{k}" for k in range(8)), *(f"DI{k}" for k in range(8)))
+"""Its digital inputs."""

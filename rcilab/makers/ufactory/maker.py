@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from rcilab.core.condition import ConditionTable
-from rcilab.core.errors import InvalidValueError
 from rcilab.makers.maker import Capabilities, Timing
-from rcilab.makers.ufactory.bounds import CLIENT_PORT, LONGEST_TOOL, SINGLE_PRECISION
+from rcilab.makers.ufactory.bounds import (
+    CLIENT_PORT,
+    INPUTS,
+    LONGEST_TOOL,
+    OUTPUTS,
+    REPORT_PERIOD,
+    SINGLE_PRECISION,
+)
 from rcilab.makers.ufactory.conditions import UFACTORY_CONDITIONS
 from rcilab.makers.ufactory.errors import UfactoryError
 from rcilab.makers.ufactory.robots import ROBOTS
@@ -16,6 +22,8 @@ if TYPE_CHECKING:
     from rcilab.makers.driver import ExpectedArm
     from rcilab.makers.parameters import ParameterGroup
     from rcilab.makers.scenario import FaultScenario
+    from rcilab.makers.ufactory.driver.address import XArmAddress
+    from rcilab.makers.ufactory.driver.xarm_driver import XArmDriver
     from rcilab.model.robot_model import RobotModel
     from rcilab.sim.controller_config import ControllerConfig
     from rcilab.sim.maker_server import MakerServer
@@ -31,8 +39,19 @@ class Ufactory:
     scheme = "xarm"
     robots = ROBOTS
     client_port = CLIENT_PORT
-    capabilities = Capabilities(simulates=True, longest_tool=LONGEST_TOOL)
-    timing = Timing()
+    capabilities = Capabilities(
+        simulates=True,
+        drives=True,
+        streams=True,
+        modes=("joint_position",),
+        guides=True,
+        outputs=OUTPUTS,
+        inputs=INPUTS,
+        switches_power=True,
+        setup=("tool", "load"),
+        longest_tool=LONGEST_TOOL,
+    )
+    timing = Timing(state_period=REPORT_PERIOD, command_period=REPORT_PERIOD)
 
     def conditions(self) -> ConditionTable:
         """Returns the conditions of the interface."""
@@ -46,13 +65,17 @@ class Ufactory:
         """Returns no scenarios."""
         return ()
 
-    def parse_address(self, text: str) -> NoReturn:
-        """Raises InvalidValueError: rcilab has no driver for these arms."""
-        raise InvalidValueError("address", text, "is that of a UFACTORY arm, which rcilab does not drive; simulate it")
+    def parse_address(self, text: str) -> XArmAddress:
+        """Returns the parts of an address, xarm://HOST."""
+        from rcilab.makers.ufactory.driver.address import parse_address
 
-    def open_driver(self, address: str, timeout: float, expected: ExpectedArm | None) -> NoReturn:
-        """Raises InvalidValueError, as `parse_address`."""
-        self.parse_address(address)
+        return parse_address(text)
+
+    def open_driver(self, address: str, timeout: float, expected: ExpectedArm | None) -> XArmDriver:
+        """Returns a connection to a controller of UFACTORY."""
+        from rcilab.makers.ufactory.driver.xarm_driver import open_driver
+
+        return open_driver(address, timeout, expected)
 
     def state_rounding(self, model: RobotModel) -> float:
         """Returns that of single precision."""

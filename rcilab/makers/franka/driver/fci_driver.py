@@ -76,7 +76,7 @@ class FciDriver:
 
     scheme = "fci"
     holds_arm_angle = False
-    keeps_newest = True
+    keeps_newest = reports_load = True
     recovery_silence = 10.0  # The library holds Python's global lock until the arm has recovered, which takes seconds.
 
     def __init__(self, client: FciClient, address: FciAddress, arm_name: str) -> None:

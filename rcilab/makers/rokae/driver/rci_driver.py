@@ -83,7 +83,7 @@ class RciDriver:
     scheme = "rci"
     resolution = 0.0
     commands_arm_angle = holds_arm_angle = True
-    keeps_newest = False
+    keeps_newest = reports_load = False
     recovery_silence = 0.0
 
     def __init__(self, connection: RciConnection, address: RciAddress, arm_name: str) -> None:

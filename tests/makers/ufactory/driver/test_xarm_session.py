@@ -1,0 +1,170 @@
+"""A session with an xArm7 is that with any arm: plan, check, execute, stop, error, recover, record."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+
+from rcilab.core.command import JointPosition
+from rcilab.core.errors import CommandRejectedError, ControlError, DeadlineError, InvalidValueError, ModelError
+from rcilab.core.spatial import Pose
+from rcilab.core.state import RobotMode
+from rcilab.execution.session import connect
+from rcilab.makers.ufactory.errors import UfactoryError
+from rcilab.motion import plan_joint
+from rcilab.recording.run import load_run
+from tests.makers.ufactory.driver.conftest import HOME
+
+OFF = np.array([0.3, 0.2, -0.2, 0.3, 0.2, 0.1, 0.4])
+ROUNDING = 3e-7  # [rad] Half a unit in the last place of single precision, in which the arm reports its angles.
+CYCLES = 5  # Of 1 ms between two reports in real time.
+
+
+def test_a_checked_motion_arrives_and_each_target_is_that_of_its_report(robot, tmp_path):
+    motion = plan_joint(robot.model, robot.state.q_c, HOME + OFF, speed=0.4)
+    run = robot.execute(motion)
+    assert (run.faults, run.stopped) == ((), None)
+    assert np.abs(robot.state.q_c - motion.q[-1]).max() <= ROUNDING
+    sent = run.cycles[np.isfinite(run.cycles["command"]).all(axis=1)]
+    rows = np.round(1e3 * sent["t"]).astype(int)
+    assert not (rows % CYCLES).any()
+    assert np.array_equal(sent["command"], motion.q[np.minimum(rows, len(motion.q) - 1)])
+    assert (sent["sent_ns"] >= sent["received_ns"]).all()
+    run.save(tmp_path / "a.rcirun")
+    assert len(load_run(tmp_path / "a.rcirun").cycles) == len(run.cycles)
+
+
+def test_a_motion_is_stopped_on_request_and_the_next_one_begins_there(robot):
+    motion = plan_joint(robot.model, robot.state.q_c, HOME + 0.5, speed=0.2)
+    run = robot.execute(motion, progress=lambda t, duration: robot.stop() if t > 0.1 else None)
+    assert run.stopped == "on request"
+    assert robot.state.robot_mode is RobotMode.IDLE
+    assert np.abs(robot.state.q_c - motion.q[-1]).max() > 0.01
+    assert robot.move_j(HOME, 0.1).faults == ()
+
+
+def test_a_callback_begins_at_the_arm_and_its_last_command_is_reached(robot):
+    goal = HOME + 0.05 * np.eye(7)[3]
+
+    def glide(state, t):
+        u = min(2.0 * t, 1.0)
+        return JointPosition(HOME + u**3 * (10.0 - 15.0 * u + 6.0 * u * u) * (goal - HOME), finished=u == 1.0)
+
+    robot.control(glide)
+    assert np.abs(robot.state.q_c - goal).max() <= 1e-6
+    with pytest.raises(InvalidValueError, match=r"first command.*must be the present position"):
+        robot.control(lambda state, t: JointPosition(HOME + 0.01))
+    assert robot.state.robot_mode is RobotMode.IDLE
+    with pytest.raises(ModelError, match="has no torque mode"):
+        robot.control(lambda state, t: JointPosition(state.q_c), "torque")
+
+
+def test_an_error_ends_a_motion_with_its_name_and_recover_clears_it(robot):
+    """Beyond the range of joint 4; the library refuses angles outside the ranges of its own tables, far from here."""
+    far = HOME + 10.0 * np.eye(7)[3]
+    with pytest.raises(CommandRejectedError, match="a joint angle is outside its range"):
+        robot.control(lambda state, t: JointPosition(HOME if t < 0.1 else far))
+    robot.recover()
+    robot.xarm.move_j(HOME)
+    fast = HOME + 1.5 * np.eye(7)[1]
+    with pytest.raises(ControlError, match=r"stopped the motion at t = .*C\d+ \(.*recover\(\) clears") as caught:
+        robot.control(lambda state, t: JointPosition(HOME if t < 0.1 else fast))
+    assert isinstance(caught.value.faults[0], UfactoryError)
+    assert robot.state.faults == caught.value.faults
+    with pytest.raises(CommandRejectedError, match="an error is set; C"):
+        robot.move_j(HOME + 0.1)
+    robot.recover()
+    assert robot.state.faults == ()
+    robot.xarm.move_j(HOME)
+
+
+def test_an_emergency_stop_ends_a_motion_and_must_be_released(robot):
+    motion = plan_joint(robot.model, robot.state.q_c, HOME + OFF, speed=0.2)
+    with pytest.raises(ControlError, match="the emergency stop is pressed") as caught:
+        robot.execute(motion, progress=lambda t, duration: robot.simulation.press("estop") if t > 0.1 else None)
+    assert caught.value.code == "safety_stop"
+    assert robot.state.robot_mode is RobotMode.USER_STOPPED
+    with pytest.raises(DeadlineError, match=r"C1: .* did not clear: remove its cause first"):
+        robot.recover()
+    robot.simulation.press("none")
+    robot.recover()
+    assert robot.state.robot_mode is RobotMode.IDLE
+
+
+def test_motors_are_switched_over_the_interface(robot):
+    robot.power_off()
+    assert not robot.is_powered()
+    with pytest.raises(CommandRejectedError, match=r"the motors are off; switch them on: power_on\(\)"):
+        robot.move_j(HOME + 0.1)
+    robot.power_on()
+    assert robot.is_powered()
+    motion = plan_joint(robot.model, robot.state.q_c, HOME + OFF, speed=0.2)
+    with pytest.raises(ControlError, match="motor power was switched off during the motion"):
+        robot.execute(motion, progress=lambda t, duration: robot.power_off() if t > 0.1 else None)
+
+
+def test_closing_a_session_stops_its_motion(robot):
+    with connect(robot.address) as other:
+        motion = plan_joint(other.model, other.state.q_c, HOME + OFF, speed=0.2)
+        run = other.execute(motion, progress=lambda t, duration: other.close() if t > 0.1 else None)
+    assert run.stopped == "the session was closed while a motion ran"
+    assert np.abs(robot.state.dq).max() == 0.0
+
+
+def test_motions_are_planned_by_the_controller(robot):
+    commands = robot.xarm
+    commands.move_j(HOME + 0.1 * OFF)
+    assert np.abs(robot.state.q_c - HOME - 0.1 * OFF).max() <= ROUNDING
+    start = robot.state.T_base_tool_c
+    goal = start @ Pose([0.02, 0.0, 0.03])
+    commands.move_l(goal, 0.3)
+    assert robot.state.T_base_tool_c.is_close(goal, 1e-6)
+    via, end = goal @ Pose([0.02, 0.02, 0.0]), goal @ Pose([0.0, 0.04, 0.0])
+    commands.move_c(via, end, 0.3)
+    assert np.abs(robot.state.T_base_tool_c.position - end.position).max() <= 1e-5
+    commands.set_user_frame(Pose([0.1, 0.2, 0.3]))
+    commands.move_l(start, 0.3)
+    assert robot.state.T_base_tool_c.is_close(start, 1e-5)
+    commands.set_user_frame(Pose())
+    with pytest.raises(InvalidValueError, match=r"speed.*is outside 0 to 1 \[m/s\]"):
+        commands.move_l(start, 100.0)
+
+
+def test_a_planned_motion_can_be_stopped_from_another_thread(robot):
+    timer = threading.Timer(0.2, robot.xarm.stop)
+    timer.start()
+    with pytest.raises(ControlError, match="the motion was stopped before its end"):
+        robot.xarm.move_j(HOME + 0.5, 0.2)
+    timer.join()
+    assert np.abs(robot.state.q_c - HOME).max() < 0.4
+    robot.xarm.move_j(HOME)
+
+
+def test_tool_and_load_are_sent_and_another_session_reads_them(robot):
+    tool = Pose([0.0, 0.02, 0.1])
+    robot.set_tool(tool)
+    robot.set_load(0.5, [0.0, 0.0, 0.04], np.zeros((3, 3)))
+    assert robot.state.T_base_tool_c.is_close(robot.model.forward(robot.state.q_c), 1e-6)
+    with connect(robot.address) as other:
+        assert other.model.T_flange_tool.is_close(tool, 1e-6)
+        assert (other.model.load.mass, other.model.load.center_of_mass[2]) == pytest.approx((0.5, 0.04))
+
+
+def test_the_arm_is_guided_in_mode_2(robot):
+    driver = robot._driver
+    driver.start_guiding("joint", "free")
+    assert robot.receive_state().robot_mode is RobotMode.GUIDING
+    driver.stop_guiding()
+    assert robot.receive_state().robot_mode is RobotMode.IDLE
+    with pytest.raises(ModelError, match="blocks no direction"):
+        driver.start_guiding("cartesian", "translation")
+
+
+def test_signals_of_the_control_box(robot):
+    robot.simulation.set_input(2, True)
+    assert [robot.read_input(k) for k in (1, 2)] == [False, True]
+    robot.simulation.set_input(2, False)
+    robot.set_output(3, True)
+    robot.set_output(3, False)
