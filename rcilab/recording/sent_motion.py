@@ -303,7 +303,9 @@ def _note_missing(count: int) -> tuple[str, ...]:
 
 
 def _with_duration(motion: Motion, run: Run) -> Motion:
-    """Returns a motion with a note where the controller took another time to play its commands."""
+    """Returns a motion with a note where the controller took another time to play its commands, which have angles."""
+    if run.has_playout and _has_rates(run.cycles):
+        return motion
     span = played_span(run.cycles) if run.has_playout else motion.duration
     if abs(motion.duration - span) < CYCLE_TIME / 2.0:
         return motion

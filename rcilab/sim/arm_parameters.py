@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Self
+from typing import Any, Self
 
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.limits import JointLimits
@@ -86,3 +86,33 @@ class ArmParameters:
     def guiding_box(self) -> SafetyBox | None:
         """The box whose walls push the tool back; None without such walls."""
         return active_box(self.safety_box) if self.virtual_guide else None
+
+    def describe(self) -> dict[str, Any]:
+        """Returns the settings that the maker's controller has, as JSON data in SI units, without tool and load."""
+        box = self.safety_box
+        return {
+            "joint_lower": self.joint_lower,
+            "joint_upper": self.joint_upper,
+            "collision_thresholds": self.collision_thresholds,
+            "joint_stiffness": self.joint_stiffness,
+            "cartesian_stiffness": self.cartesian_stiffness,
+            "desired_wrench": self.desired_wrench,
+            **self.describe_filters(),
+            "force_frame": self.T_flange_force.as_row_major(),
+            "force_axes": self.force_axes.value,
+            "virtual_guide": self.virtual_guide,
+            "auto_limit": self.auto_limit,
+            "safety_box": None
+            if box is None
+            else {"size": box.size, "pose": box.T_base_box.as_row_major(), "active": box.active},
+        }
+
+    def describe_filters(self) -> dict[str, float]:
+        """Returns the cut-off frequencies by name, [Hz]."""
+        return {
+            "joint_filter": self.joint_filter,
+            "cartesian_filter": self.cartesian_filter,
+            "torque_filter": self.torque_filter,
+            "velocity_filter": self.velocity_filter,
+            "twist_filter": self.twist_filter,
+        }

@@ -211,16 +211,21 @@ class ArmServer:
             self.close()
             raise
         settings = {
-            "prefill": config.prefill_cycles,
             "lost_limit": config.lost_limit,
             "realism": config.realism,
-            "force_sign": config.force_sign,
             "lockstep": config.lockstep,
         }
+        if config.force_sign != "on-arm":  # Not every maker leaves it open.
+            settings["force_sign"] = config.force_sign
         self._capture = CycleCapture(
             self.ring,
             controller,
-            lambda: {**settings, "on_loss": controller.arm.on_loss, "limit_table": controller.limit_table},
+            lambda: {
+                **settings,
+                "prefill": controller.arm.playout.prefill,
+                "on_loss": controller.arm.on_loss,
+                "limit_table": controller.limit_table,
+            },
         )
 
     def _open_simulation_port(self) -> SimulationPort | None:

@@ -26,7 +26,6 @@ from rcilab.core.state import RobotState
 from rcilab.i18n.translator import Remark
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arm_command import ArmCommand
-from rcilab.sim.arm_parameters import ArmParameters
 from rcilab.sim.generators.motion_limits import CommandKind, MotionMode
 from rcilab.sim.maker_server import SimulatedController
 
@@ -330,7 +329,7 @@ class CycleCapture:
                 "wall_ns": time_ns(),
                 "tool": arm.model.T_flange_tool.as_row_major(),
                 "load": [load.mass, load.center_of_mass.tolist(), load.inertia.tolist()],
-                "settings": {**describe_parameters(arm.parameters), **self._describe()},
+                "settings": {**arm.parameters.describe(), **self._describe()},
             }
         )
 
@@ -379,31 +378,6 @@ class CycleCapture:
             _TAIL.pack(psi, psi_c, dpsi_c, ddpsi_c, *playout), self._no_rates,
         )  # fmt: skip
         return b"".join(parts)
-
-
-def describe_parameters(parameters: ArmParameters) -> dict[str, Any]:
-    """Returns the settings of an arm as JSON data, in SI units; tool and load are kept elsewhere."""
-    box = parameters.safety_box
-    return {
-        "joint_lower": parameters.joint_lower,
-        "joint_upper": parameters.joint_upper,
-        "collision_thresholds": parameters.collision_thresholds,
-        "joint_stiffness": parameters.joint_stiffness,
-        "cartesian_stiffness": parameters.cartesian_stiffness,
-        "desired_wrench": parameters.desired_wrench,
-        "joint_filter": parameters.joint_filter,
-        "cartesian_filter": parameters.cartesian_filter,
-        "torque_filter": parameters.torque_filter,
-        "velocity_filter": parameters.velocity_filter,
-        "twist_filter": parameters.twist_filter,
-        "force_frame": parameters.T_flange_force.as_row_major(),
-        "force_axes": parameters.force_axes.value,
-        "virtual_guide": parameters.virtual_guide,
-        "auto_limit": parameters.auto_limit,
-        "safety_box": None
-        if box is None
-        else {"size": box.size, "pose": box.T_base_box.as_row_major(), "active": box.active},
-    }
 
 
 def _pose_of(command: ArmCommand) -> tuple[float, ...]:

@@ -52,6 +52,7 @@ from rcilab.makers.franka.errors import FrankaError
 _PAGE = "Franka's page Robot and interface specifications"
 _ERRORS = "Franka's page Errors"
 _STEP = "tolerance: what one cycle may change by jerk, rcilab"
+_ELBOW_LIMITS = f"{_PAGE}, Cartesian limits, Elbow"
 _ELBOW_JOINT = 2  # From 0: Franka's elbow is the angle of joint 3.
 
 _JOINT_ERRORS = {
@@ -128,7 +129,7 @@ def _tool_row(row: Condition) -> Condition:
         quantity=row.quantity.replace("arm angle", "elbow"),
         formula=row.formula.replace("psi", "q_3"),
         fault=FrankaError.CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION,
-        source=f"{_PAGE}, Cartesian limits, Elbow; {_ERRORS}",
+        source=f"{_ELBOW_LIMITS}; {_ERRORS}",
         id=row.id.replace("arm_angle", "elbow"),
     )
     if row.order:
@@ -290,18 +291,23 @@ FCI_CONDITIONS = ConditionTable(
 range) have no row."""
 
 
-_FR3_VELOCITY = "Franka's page Control parameters, limits for Franka Research 3; numbers: the URDF of the arm"
+_FR3_PAGE = "Franka's page Control parameters, limits for Franka Research 3"
+_FR3_URDF = "numbers: the URDF of the arm"
+_OF_URDF = ("joint.position", "joint.torque", "torque.range", "elbow.position")
 
 
 def _fr3_row(row: Condition) -> Condition:
-    """Returns a row of the Panda in the FR3's form."""
-    if row.id in ("joint.position", "inverse.joint.position"):
-        return replace(row, fault=FrankaError.JOINT_POSITION_LIMITS_VIOLATION)
-    if row.id in ("joint.velocity", "inverse.joint.velocity"):
-        return replace(row, formula="dq_min(q) < dq_c < dq_max(q)", source=f"{_FR3_VELOCITY}; {_ERRORS}")
-    if row.id == "cartesian.velocity.translation":
-        return replace(row, source=row.source.replace(_LIBRARY_VELOCITY, "norm: rcilab"))
-    return row
+    """Returns a row of the Panda in the FR3's form: the rule is that of the same page, its numbers are not."""
+    name = row.id.removeprefix("inverse.")
+    if name == "joint.velocity":
+        source = f"{_FR3_PAGE}; {_FR3_URDF}; {_ERRORS}"
+        return replace(row, formula="dq_min(q) < dq_c < dq_max(q)", source=source)
+    if row.is_measured or row.stage != "throughout" or not (row.order or name in _OF_URDF):
+        return row
+    numbers = _FR3_URDF if name in _OF_URDF else f"numbers: {_FR3_PAGE}"
+    source = row.source.replace(_LIBRARY_VELOCITY, "norm: rcilab").replace(_ELBOW_LIMITS, f"{_PAGE}, Elbow")
+    fault = FrankaError.JOINT_POSITION_LIMITS_VIOLATION if name == "joint.position" else row.fault
+    return replace(row, fault=fault, source=f"{source}; {numbers}")
 
 
 _FR3 = {row.id: _fr3_row(row) for row in FCI_CONDITIONS.conditions}

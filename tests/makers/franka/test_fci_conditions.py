@@ -84,6 +84,16 @@ def test_the_stricter_translation_velocity_of_the_page_is_a_setting_and_the_repo
         cartesian_limits(PANDA.limits, "page")
 
 
+def test_every_number_of_the_fr3_is_from_a_source_of_the_fr3():
+    panda, fr3 = PANDA.limits, load_model("FR3").limits
+    for row in FR3_CONDITIONS.conditions:
+        if row.is_measured or row.stage != "throughout" or row.bounds_at is not None:
+            continue
+        has_own = any((a != b).any() for a, b in zip(row.bounds(panda), row.bounds(fr3), strict=True))
+        assert not has_own or "Franka Research 3" in row.source or "URDF of the arm" in row.source, row.id
+    assert "Franka Research 3" in FR3_CONDITIONS.find("joint.acceleration").source
+
+
 def test_a_condition_that_raises_an_error_is_necessary_and_ids_are_unique():
     assert all((row.fault is not None) == (row.necessity == "necessary") for row in FCI.conditions)
     assert all(row.fault is None or isinstance(row.fault, FrankaError) for row in FCI.conditions)

@@ -6,8 +6,9 @@ An invalid value is answered with "invalid argument" and changes nothing. Frames
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from math import hypot, inf, isfinite
+from typing import Any
 
 import numpy as np
 
@@ -86,6 +87,18 @@ class Settings(ArmParameters):
             end_effector=Payload(),
             client_load=Payload(),
         )
+
+    def describe(self) -> dict[str, Any]:
+        """Returns the settings that a client sets, by the names of the maker's library, as JSON data in SI units."""
+        return {
+            "F_T_NE": self.F_T_NE.as_row_major(),
+            "NE_T_EE": self.NE_T_EE.as_row_major(),
+            "EE_T_K": self.EE_T_K.as_row_major(),
+            "joint_stiffness": self.joint_stiffness,
+            "cartesian_stiffness": self.cartesian_stiffness,
+            **{f"{item.name}_thresholds": getattr(self.thresholds, item.name) for item in fields(self.thresholds)},
+            **self.describe_filters(),
+        }
 
 
 def apply_setup(settings: Settings, setup: ArmSetup, arm: RobotDescription) -> Settings:

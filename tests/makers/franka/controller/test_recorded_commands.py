@@ -22,6 +22,8 @@ from rcilab.recording.sent_motion import check_sent, sent_motion
 from rcilab.sim.cycle_capture import CycleCapture
 from rcilab.sim.plants import build_plant
 from rcilab.sim.virtual_arm import VirtualArm
+from tests.peers.franka.arena import fci_arena
+from tests.peers.franka.robot import Output
 
 CYCLES = 600
 FIELDS = {1: "command_dq", 3: "command_twist", 0: "command_goal"}
@@ -141,6 +143,21 @@ def test_a_motion_that_was_stopped_for_its_command_does_not_conform(
     assert report.violations[0].time == pytest.approx(0.05, abs=2e-3)
     assert setup.motion_kind == KINDS[mode]
     ring.close()
+
+
+def test_the_settings_in_force_are_those_of_this_maker() -> None:
+    with fci_arena(10, is_recorded=True) as place, place.connect() as robot:
+        state = robot.move(0, 0)
+        robot.play(state, lambda state, k: Output(q=state.q_d), cycles=5)
+        ring = place.arena.server.ring
+        assert ring is not None
+        events, _ = ring.events(0)
+    settings = events[0]["settings"]
+    assert settings["prefill"] == 0
+    assert settings["collision_torque_thresholds"] == settings["contact_torque_accelerating_thresholds"] == [20.0] * 7
+    assert settings["collision_force_thresholds"] == [20.0] * 6
+    assert {"F_T_NE", "NE_T_EE", "EE_T_K", "joint_stiffness", "cartesian_filter"} <= settings.keys()
+    assert not {"collision_thresholds", "safety_box", "joint_lower", "force_frame", "desired_wrench"} & settings.keys()
 
 
 def test_a_motion_that_follows_at_once_is_another_one_in_the_record() -> None:
