@@ -13,11 +13,11 @@ from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_arc, plan_circle, plan_line, plan_nullspace
-from rcilab.robots import ROBOT_NAMES
+from tests.arms import ANY_POSE
 from tests.model.kinematics.elbow import branch_ranges
 
 SEVEN, SIX = load_model("xMatePro7"), load_model("xMate3")
-ALL = pytest.mark.parametrize("name", ROBOT_NAMES)
+ALL = pytest.mark.parametrize("name", ANY_POSE)
 
 
 def moved(model, step, rpy=(0.0, 0.0, 0.0)) -> Pose:

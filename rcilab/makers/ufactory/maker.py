@@ -1,4 +1,4 @@
-"""UFACTORY: the arms xArm6, xArm7, Lite6 and 850, their errors and conditions."""
+"""UFACTORY: the arms xArm5, xArm6, xArm7, Lite6 and 850, their errors and conditions."""
 
 from __future__ import annotations
 

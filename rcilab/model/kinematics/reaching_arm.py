@@ -184,6 +184,6 @@ class ReachingArm(MovingArm):
 
     def _require_arm_angle(self) -> None:
         if not self.redundancy:
-            raise KinematicsError(f"{self.description.name} has 6 axes: only a 7-axis arm has an arm angle").coded(
-                "no_psi"
-            )
+            raise KinematicsError(
+                f"{self.description.name} has {self.description.n} axes: only a 7-axis arm has an arm angle"
+            ).coded("no_psi")

@@ -12,6 +12,7 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.robots import ROBOT_NAMES
+from tests.arms import ANY_POSE
 
 TOOL = Pose.from_rpy((0.03, -0.02, 0.12), (0.3, -0.4, 0.5))
 
@@ -70,7 +71,7 @@ def test_a_seed_that_is_none_is_refused(seed):
         load_model("xMatePro7").sample_workspace(10, seed=seed)
 
 
-@pytest.mark.parametrize("name", ROBOT_NAMES)
+@pytest.mark.parametrize("name", ANY_POSE)
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_dexterity_says_how_fast_the_tool_moves_and_how_the_joints_pay_for_it(name, seed):
