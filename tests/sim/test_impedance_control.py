@@ -169,7 +169,7 @@ def test_an_untouched_arm_follows_its_reference() -> None:
         tau = joint_impedance(model, q, dq, ddq, measured, stiffness)
         measured = plant.step(Setpoint(Drive.TORQUE, q, dq, ddq, tau))
         worst = max(worst, float(np.abs(measured.q - q).max()))
-    assert worst < 1e-4  # [rad] The motion is 1.3 mrad farther at the end of each millisecond than at its beginning.
+    assert worst < 4e-4  # [rad] It begins with a jump of its acceleration, and the springs are soft.
 
 
 def test_an_untouched_tool_follows_its_reference() -> None:
