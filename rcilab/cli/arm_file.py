@@ -137,6 +137,8 @@ _SECTIONS: dict[str, dict[str, _Read]] = {
         "on_loss": _text,
         "auto_limit": as_flag,
         "loop_back": as_flag,
+        "fresh": as_flag,
+        "generation": _whole,
         "limits": _text,
         "force_sign": _text,
         "world_port": _whole,

@@ -148,6 +148,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="stop commands inside the soft joint limits, each joint by itself: with commanded poses the tool then "
         "leaves the commanded pose",
     )
+    parser.add_argument(
+        "--fresh", action="store_true", help="forget what a client has stored in the controller, as joint parameters"
+    )
+    parser.add_argument(
+        "--generation",
+        type=int,
+        metavar="N",
+        help="generation of the controller, where its maker has several: 3 or 4 (3)",
+    )
     parser.add_argument("--loop-back", action="store_true", help="connect digital outputs to the inputs")
     parser.add_argument("--limits", metavar="TABLE", help="Cartesian limits: manual or sdk (RCI: manual; FCI: sdk)")
     parser.add_argument(
@@ -299,6 +308,8 @@ def _config(options: Mapping[str, Any]) -> ControllerConfig:
         on_loss=option("on_loss", "hold"),
         auto_limit=option("auto_limit", False),
         loop_back=option("loop_back", False),
+        fresh=option("fresh", False),
+        generation=option("generation"),
         limit_table=option("limits"),
         force_sign=option("force_sign", "on-arm"),
         start=_parsed(option("start"), lambda text: parse_joints(text, n)),

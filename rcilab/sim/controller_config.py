@@ -116,6 +116,10 @@ class ControllerConfig:
     own."""
     inputs: tuple[int, ...] = ()
     """Numbers of the digital inputs that are high, from 0."""
+    fresh: bool = False
+    """Whether to forget what a client has stored in the controller, for makers whose controllers keep settings."""
+    generation: int | None = None
+    """Generation of the controller that clients see, for makers with several; None: the maker's default."""
     network: NetworkFaults = field(default_factory=NetworkFaults)
     """Simulated network faults, from power-up on."""
     states_network: NetworkFaults | None = None

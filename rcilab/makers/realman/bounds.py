@@ -17,7 +17,7 @@ LARGEST_JOINT_ACCELERATION: Final = 500_000
 LARGEST_JOINT_SPEED: Final = 100_000
 """Of set_joint_max_speed, [0.001 RPM]; rcilab's own bound, the maker names none."""
 ANGLE_STEP: Final = 0.001  # [deg] Resolution of joint angles on the wire.
-LINE_SPEED: Final = 0.25  # [m/s] Of a new controller; rcilab's own choice, as the three below.
+LINE_SPEED: Final = 0.25  # [m/s] After set_arm_init, as the three below.
 LINE_ACCELERATION: Final = 1.6  # [m/s^2]
 ANGULAR_SPEED: Final = 0.6  # [rad/s]
 ANGULAR_ACCELERATION: Final = 4.0  # [rad/s^2]

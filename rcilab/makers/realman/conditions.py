@@ -97,7 +97,7 @@ _LINKS = Condition(
 REALMAN_CONDITIONS = ConditionTable(
     name="RealMan",
     motion=_MOTION,
-    cartesian=(*_TOOL, *(row for row in _MOTION if row.signal == "torque")),
+    cartesian=(*_TOOL, *(row for row in _MOTION if row.stage == "throughout")),
     torque=_TORQUES,
     measured=_MEASURED,
     box=_BOX,

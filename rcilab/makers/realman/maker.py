@@ -31,7 +31,7 @@ class RealMan:
     scheme = "realman"
     robots = ROBOTS
     client_port = None
-    capabilities = Capabilities(longest_tool=LONGEST_TOOL)
+    capabilities = Capabilities(simulates=True, longest_tool=LONGEST_TOOL)
     timing = Timing()
 
     def conditions(self) -> ConditionTable:
@@ -59,8 +59,10 @@ class RealMan:
         return radians(ANGLE_STEP)
 
     def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:
-        """Raises an error: rcilab has no virtual controller of these arms."""
-        raise NotImplementedError
+        """Returns the server of an arm."""
+        from rcilab.makers.realman.controller.realman_server import build_realman_server
+
+        return build_realman_server(arm, config)
 
     def faults(self) -> type[RealManError]:
         """Returns the errors of the controllers and of their joints."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import inf, radians
+from math import inf, radians, sqrt
 from types import MappingProxyType
 
 from rcilab.core.arrays import readonly_copy
@@ -26,9 +26,11 @@ from rcilab.makers.realman.errors import RealManError
 from rcilab.robots.description import DhRow, Link, RobotDescription, Rod
 
 ALGO = "the maker's client library (Robotic_Arm 1.1.6), class Algo"
+PAGES = "maker's pages on the JSON protocol"
 PACKAGE = "maker's public ROS 2 description package, inertials, in the axes of rcilab's link frames"
 
 _ACCELERATION = radians(100.0 * DEGREES_PER_TURN / SECONDS_PER_MINUTE)  # [rad/s^2] 100 RPM/s.
+_DISC_RADIUS, _DISC_REACH = 0.014, 0.018  # [m] Of the rods that make the disc of a flange.
 _RISE = 0.1  # [s] Time to full acceleration, from which the jerk follows: a choice of rcilab.
 
 Figures = tuple[float, tuple[float, float, float], tuple[float, float, float, float, float, float]]
@@ -75,10 +77,10 @@ def realman_limits(
         "joint.torque_rate": choice,
         "joint.collision_threshold": choice,
         "joint.stiffness": choice,
-        "cartesian.translation_velocity": "rcilab: set_arm_max_line_speed of a new controller; the maker names none",
-        "cartesian.translation_acceleration": "rcilab: set_arm_max_line_acc of a new controller; the maker names none",
-        "cartesian.rotation_velocity": "rcilab: set_arm_max_angular_speed of a new controller; the maker names none",
-        "cartesian.rotation_acceleration": "rcilab: set_arm_max_angular_acc of a new controller; the maker names none",
+        "cartesian.translation_velocity": f"{PAGES}, set_arm_init",
+        "cartesian.translation_acceleration": f"{PAGES}, set_arm_init",
+        "cartesian.rotation_velocity": f"{PAGES}, set_arm_init",
+        "cartesian.rotation_acceleration": f"{PAGES}, set_arm_init",
         "cartesian.translation_jerk": f"rcilab: the acceleration within {_RISE} s; the maker names none",
         "cartesian.rotation_jerk": f"rcilab: the acceleration within {_RISE} s; the maker names none",
         "cartesian.translation_stiffness": choice,
@@ -162,24 +164,41 @@ def chain_rods(
     spans: Sequence[Sequence[int]],
     radii: Sequence[float],
     origins: Sequence[tuple[float, float, float]],
+    face: tuple[int, int, int] = (0, 0, 1),
 ) -> tuple[tuple[Rod, ...], ...]:
     """Returns the rods of base and links along a line through an arm, after its figures and pictures.
 
     Args:
         points: Points of the line in base at zero pose, [m].
-        spans: For base and links, the indices of their points.
+        spans: For base and all links but the last, the indices of their points; the last link is a disc.
         radii: Their radii, [m].
         origins: Origins of the links' frames in base at zero pose, [m].
+        face: Direction of the flange in base at zero pose, along an axis.
     """
 
     def rods(span: Sequence[int], radius: float, origin: tuple[float, float, float]) -> tuple[Rod, ...]:
         local = [_less(points[index], origin) for index in span]
         return tuple(Rod(start=a, end=b, radius=radius) for a, b in pairwise(local))
 
-    return tuple(
-        rods(span, radius, origin)
-        for span, radius, origin in zip(spans, radii, ((0.0, 0.0, 0.0), *origins), strict=True)
-    )
+    frames = ((0.0, 0.0, 0.0), *origins[:-1])
+    return *(rods(span, r, origin) for span, r, origin in zip(spans, radii, frames, strict=True)), _disc(face)
+
+
+def _disc(face: tuple[int, int, int]) -> tuple[Rod, ...]:
+    """Returns the disc of the flange as a star of rods, in the last link's frame."""
+    axis = face.index(1)
+    first, second = (other for other in range(3) if other != axis)
+
+    def rod(a: float, b: float) -> Rod:
+        ends = []
+        for sign in (-1.0, 1.0):
+            end = [-_DISC_RADIUS * value for value in face]
+            end[first], end[second] = sign * a, sign * b
+            ends.append((end[0], end[1], end[2]))
+        return Rod(start=ends[0], end=ends[1], radius=_DISC_RADIUS)
+
+    slant = _DISC_REACH * sqrt(0.5)
+    return rod(_DISC_REACH, 0.0), rod(0.0, _DISC_REACH), rod(slant, slant), rod(slant, -slant)
 
 
 def _less(a: tuple[float, float, float], b: tuple[float, float, float]) -> tuple[float, float, float]:

@@ -1,0 +1,87 @@
+"""A program with RealMan's client library only, as a user writes it; it prints what its calls return, as JSON.
+
+Run by the tests in a process of its own: the library has threads of its own, and may wait after a failed handshake.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from typing import Any
+
+
+def joint_commands(robot: Any, n: int) -> dict[str, Any]:
+    """Calls every method of JointConfigSettings and JointConfigReader."""
+    found: dict[str, Any] = {"refused while enabled": robot.rm_set_joint_max_speed(2, 90.0)}
+    found["disabled"] = robot.rm_set_joint_en_state(2, 0)
+    found["speed"] = [robot.rm_set_joint_max_speed(2, 90.0), robot.rm_get_joint_max_speed()]
+    found["acceleration"] = [robot.rm_set_joint_max_acc(2, 600.0), robot.rm_get_joint_max_acc()]
+    found["lower"] = [robot.rm_set_joint_min_pos(2, -100.0), robot.rm_get_joint_min_pos()]
+    found["upper"] = [robot.rm_set_joint_max_pos(2, 100.0), robot.rm_get_joint_max_pos()]
+    found["drive speed"] = [robot.rm_set_joint_drive_max_speed(2, 120.0), robot.rm_get_joint_drive_max_speed()]
+    found["drive acceleration"] = [robot.rm_set_joint_drive_max_acc(2, 600.0), robot.rm_get_joint_drive_max_acc()]
+    found["drive lower"] = [robot.rm_set_joint_drive_min_pos(2, -90.0), robot.rm_get_joint_drive_min_pos()]
+    found["drive upper"] = [robot.rm_set_joint_drive_max_pos(2, 90.0), robot.rm_get_joint_drive_max_pos()]
+    found["zero"] = robot.rm_set_joint_zero_pos(2)
+    found["cleared"] = robot.rm_set_joint_clear_err(2)
+    found["enabled while one is disabled"] = robot.rm_get_joint_en_state()
+    found["error flags"] = robot.rm_get_joint_err_flag()
+    for joint in range(1, n + 1):
+        robot.rm_set_joint_en_state(joint, 0)
+    found["factory ranges"] = [robot.rm_auto_set_joint_limit(1), robot.rm_get_joint_max_pos()]
+    found["enabled"] = [robot.rm_set_joint_en_state(joint, 1) for joint in range(1, n + 1)]
+    return found
+
+
+def motions(robot: Any, n: int) -> dict[str, Any]:
+    """Moves as the maker's examples do, waiting for each end."""
+    start = [0, -20, -70, 0, -90, 0] if n == 6 else [0, 20, 0, 70, 0, 90, 0]
+    wait = 1 if n else 0
+    found: dict[str, Any] = {"movej": robot.rm_movej(start, 50, 0, 0, wait)}
+    pose = robot.rm_get_current_arm_state()[1]["pose"]
+    found["movej_p"] = robot.rm_movej_p([*pose[:2], pose[2] + 0.05, *pose[3:]], 50, 0, 0, wait)
+    found["movel"] = robot.rm_movel(pose, 50, 0, 0, wait)
+    via, end = [pose[0], 0.03, pose[2] + 0.03, *pose[3:]], [pose[0], 0.06, pose[2], *pose[3:]]
+    found["movec"] = robot.rm_movec(via, end, 50, 0, 0, 0, wait)
+    found["moves"] = [
+        robot.rm_moves([pose[0], 0.06 - 0.02 * i, pose[2] + 0.01 * (i % 2), *pose[3:]], 50, 0, int(i < 3), wait)
+        for i in range(1, 4)
+    ]
+    found["joint step"] = robot.rm_set_joint_step(1, 5.0, 50, wait)
+    found["refused"] = robot.rm_movej([179.0, *start[1:]], 50, 0, 0, wait)
+    found["error"] = robot.rm_get_current_arm_state()[1]["err"]
+    found["cleared"] = robot.rm_clear_system_err()
+    found["frames"] = [
+        robot.rm_set_manual_work_frame("table", [0.1, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        robot.rm_change_work_frame("table"),
+        robot.rm_get_current_work_frame()[1]["name"],
+        robot.rm_change_work_frame("World"),
+        robot.rm_delete_work_frame("table"),
+    ]
+    q = robot.rm_get_joint_degree()[1][:n]
+    for i in range(50):
+        robot.rm_movej_canfd([q[0] + 0.2 * (i + 1), *q[1:]], True, 0, 0, 0)
+        time.sleep(0.01)
+    time.sleep(0.5)
+    found["streamed"] = robot.rm_get_joint_degree()[1][0] - q[0]
+    found["stop"] = [robot.rm_set_arm_pause(), robot.rm_set_arm_continue(), robot.rm_set_arm_slow_stop()]
+    found["stop"].append(robot.rm_set_arm_stop())
+    return found
+
+
+def main() -> None:
+    """Runs a part in a thread mode: HOST PORT MODE PART."""
+    from Robotic_Arm.rm_robot_interface import RoboticArm, rm_thread_mode_e
+
+    host, port, mode, part = sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), sys.argv[4]
+    robot = RoboticArm(rm_thread_mode_e(mode))
+    handle = robot.rm_create_robot_arm(host, port, 3)
+    info = robot.rm_get_robot_info()[1]
+    found = {"joint_commands": joint_commands, "motions": motions}[part](robot, info["arm_dof"])
+    robot.rm_delete_robot_arm()
+    print("FOUND", json.dumps({"id": handle.id, "info": info, **found}, default=str), flush=True)
+
+
+if __name__ == "__main__":
+    main()

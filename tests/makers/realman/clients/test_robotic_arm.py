@@ -1,0 +1,82 @@
+"""The maker's client library, unmodified, against `rcilab controller`: all joint commands, and motions."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.peers.arena import Process
+
+pytest.importorskip("Robotic_Arm", reason="needs the extra realman")
+
+PROGRAM = Path(__file__).with_name("programs.py")
+MODES = {"single": 0, "dual": 1, "triple": 2}
+AXES = {"RM65": 6, "RM75": 7}
+LONGEST = 60.0  # [s] A program that waits for longer hangs.
+
+
+@pytest.fixture(scope="module", params=AXES)
+def served(request: pytest.FixtureRequest) -> Iterator[tuple[str, Process]]:
+    with Process("--host", "127.0.0.1", model=request.param) as process:
+        yield request.param, process
+
+
+def run(process: Process, mode: str, part: str, home: Path) -> dict[str, Any]:
+    command = [sys.executable, str(PROGRAM), process.host, str(process.port), str(MODES[mode]), part]
+    output = subprocess.run(
+        command, capture_output=True, text=True, timeout=LONGEST, check=True, env={"HOME": str(home)}, cwd=home
+    ).stdout
+    (line,) = (line for line in output.splitlines() if line.startswith("FOUND "))
+    return json.loads(line.removeprefix("FOUND "))
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_every_joint_command_does_what_it_says(served: tuple[str, Process], mode: str, tmp_path: Path):
+    model, process = served
+    n = AXES[model]
+    found = run(process, mode, "joint_commands", tmp_path)
+    assert found["id"] > 0
+    assert (found["info"]["arm_dof"], found["info"]["robot_controller_version"]) == (n, 3)
+    assert found["refused while enabled"] == 1
+    assert found["disabled"] == 0
+    for name, value in (
+        ("speed", 90.0),
+        ("acceleration", 600.0),
+        ("lower", -100.0),
+        ("upper", 100.0),
+        ("drive speed", 120.0),
+        ("drive acceleration", 600.0),
+        ("drive lower", -90.0),
+        ("drive upper", 90.0),
+    ):
+        code, (read, values) = found[name]
+        assert (code, read) == (0, 0), name
+        assert len(values) == n
+        assert values[1] == pytest.approx(value, abs=0.01), name
+    assert (found["zero"], found["cleared"]) == (0, 0)
+    assert found["enabled while one is disabled"] == [0, [1, 0] + [1] * (n - 2)]
+    assert found["error flags"]["brake_state"] == [0, 1] + [0] * (n - 2)
+    code, (_, upper) = found["factory ranges"]
+    assert code == 0
+    assert upper[1] == 130.0
+    assert found["enabled"] == [0] * n
+
+
+def test_motions_end_where_they_should_and_refusals_are_seen(served: tuple[str, Process], tmp_path: Path):
+    _, process = served
+    found = run(process, "triple", "motions", tmp_path)
+    for name in ("movej", "movej_p", "movel", "movec", "joint step", "cleared"):
+        assert found[name] == 0, name
+    assert found["moves"] == [0, 0, 0]
+    assert found["refused"] == 1
+    assert "0x1002" in str(found["error"]) or "4098" in str(found["error"]) or "1002" in str(found["error"])
+    assert found["frames"][:2] == [0, 0]
+    assert found["frames"][2] == "table"
+    assert found["streamed"] == pytest.approx(10.0, abs=0.1)
+    assert found["stop"] == [0, 0, 0, 0]
