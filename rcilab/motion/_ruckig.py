@@ -238,11 +238,11 @@ class PathStepper:
         problem.target_position, problem.target_velocity = [s], [ds]
         problem.max_velocity, problem.max_acceleration, problem.max_jerk = [velocity], [acceleration], [jerk]
 
-    def brake(self, acceleration: float, jerk: float) -> None:
-        """Stops from the next step on, inside these bounds, above zero."""
+    def change_to(self, ds: float, acceleration: float, jerk: float) -> None:
+        """Changes to a constant velocity from the next step on, inside these bounds, above zero."""
         problem = self._problem
         problem.control_interface = _VELOCITY
-        problem.target_velocity, problem.max_acceleration, problem.max_jerk = [0.0], [acceleration], [jerk]
+        problem.target_velocity, problem.max_acceleration, problem.max_jerk = [ds], [acceleration], [jerk]
 
     def step(self) -> bool:
         """Advances one cycle; returns False, and does not move, where ruckig finds no curve."""

@@ -10,6 +10,8 @@ from rcilab.motion import _ruckig
 from rcilab.sim.planner.velocity_change import change_distance, fastest_after, fastest_before, slowest_after
 
 _ROUNDING = 1.0 - 1e-7  # ruckig refuses a target velocity above its bound, and solves with a tolerance.
+_ENOUGH = 1.0 + 1e-6
+_TOLERANCE = 2e-8  # Of path lengths: ruckig ends up to 1e-8 beside a place.
 _SMALLEST = 1e-9  # Part of a stretch's velocity below which the law stands.
 
 
@@ -40,6 +42,7 @@ class PathLaw:
         self._junctions: list[float] = []  # Velocity at the end of each stretch.
         self._override = 1.0
         self._is_braking = False
+        self._is_adapting = False  # Whether the aim depends on the present state.
 
     @property
     def s(self) -> float:
@@ -99,18 +102,23 @@ class PathLaw:
         line = self._line
         if not self._stretches:
             return line.s
+        if self._is_adapting and not self._is_braking:
+            self._aim()
         if not line.step():
             _, _, acceleration, jerk = self._stretches[0]
-            line.brake(acceleration, jerk)
+            line.change_to(0.0, acceleration, jerk)
             line.step()
             self._plan()
         stretches = self._stretches
-        while len(stretches) > 1 and line.s >= stretches[0].end:
+        while len(stretches) > 1 and line.s >= stretches[0].end - (_TOLERANCE if line.ds <= _SMALLEST else 0.0):
             del stretches[0], self._junctions[0]
-            self._aim()
+            if line.dds and not self._is_braking:
+                self._plan()
+            else:
+                self._aim()
         if len(stretches) == 1 and not self._is_braking:
             end = stretches[0].end
-            if line.s >= end - _SMALLEST * (1.0 + abs(end)) and self.is_stationary:
+            if abs(line.s - end) < 2.0 * _TOLERANCE and self.is_stationary:
                 self._stretches, self._junctions = [], []
                 self._line = _ruckig.PathStepper(end)
         return self._line.s
@@ -129,21 +137,14 @@ class PathLaw:
             return
         caps = [self._override * stretch.velocity for stretch in stretches]
         junctions = [0.0] * len(stretches)
+        reachable = [0.0] * len(stretches)  # From where a stop at the last end is possible.
         for k in range(len(stretches) - 2, -1, -1):
             _, _, acceleration, jerk = stretches[k + 1]
-            length = stretches[k + 1].end - stretches[k].end
-            reachable = _fastest(junctions[k + 1], length, acceleration, jerk)
-            junctions[k] = _ROUNDING * min(caps[k], caps[k + 1], reachable)
-        v, a, s = line.ds, line.dds, line.s
+            reachable[k] = _fastest(junctions[k + 1], stretches[k + 1].end - stretches[k].end, acceleration, jerk)
+            junctions[k] = _ROUNDING * min(caps[k], caps[k + 1], reachable[k])
+        v, a, s = max(0.0, line.ds), line.dds, line.s  # Braking may end a rounding below zero.
         for k, (end, _, acceleration, jerk) in enumerate(stretches[:-1]):
-            wanted, length = junctions[k], (end - s) * _ROUNDING
-            if a == 0.0 and wanted > v:
-                junctions[k] = min(wanted, _fastest(v, length, acceleration, jerk))
-            elif change_distance(v, a, wanted, acceleration, jerk) > length:
-                if wanted >= v + a * abs(a) / (2.0 * jerk):
-                    junctions[k] = fastest_after(v, a, length, wanted, acceleration, jerk)
-                else:  # After a change of the override: it slows down as fast as it may.
-                    junctions[k] = slowest_after(v, a, length, wanted, acceleration, jerk)
+            junctions[k] = _junction(v, a, end - s, junctions[k], reachable[k], acceleration, jerk)
             v, a, s = junctions[k], 0.0, end
         self._junctions = junctions
         self._aim()
@@ -151,12 +152,60 @@ class PathLaw:
     def _aim(self) -> None:
         if not self._stretches:
             return
+        line = self._line
         end, velocity, acceleration, jerk = self._stretches[0]
         if self._is_braking:
-            self._line.brake(acceleration, jerk)
+            line.change_to(0.0, acceleration, jerk)
             return
-        junction = self._junctions[0]
-        self._line.aim_at(end, junction, max(self._override * velocity, junction), acceleration, jerk)
+        junction, cap = self._junctions[0], self._override * velocity
+        v, a, left = line.ds, line.dds, end - line.s
+        self._is_adapting = True
+        needed = change_distance(v, a, junction, acceleration, jerk)
+        if needed > left + _TOLERANCE and len(self._stretches) > 1:
+            # It passes the end with an acceleration: the stretch is too short, or its bounds are new.
+            line.change_to(max(0.0, v + a * abs(a) / (2.0 * jerk)), acceleration, jerk)
+            return
+        if needed > left - _TOLERANCE and not self.is_stationary:
+            line.change_to(junction, acceleration, jerk)
+            return
+        peak = v + max(0.0, a) ** 2 / (2.0 * jerk)
+        if peak > cap * _ENOUGH:  # After a change of the override.
+            slowed = change_distance(v, a, cap, acceleration, jerk)
+            if slowed + change_distance(cap, 0.0, junction, acceleration, jerk) < left - cap * CYCLE_TIME:
+                line.change_to(cap, acceleration, jerk)
+                return
+            cap = peak * _ENOUGH
+        else:
+            self._is_adapting = False
+        line.aim_at(end, junction, max(cap, junction), acceleration, jerk)
+
+
+def _junction(
+    v: float, a: float, length: float, wanted: float, reachable: float, acceleration: float, jerk: float
+) -> float:
+    """Returns the velocity at the end of a stretch that is closest to the wanted one.
+
+    Args:
+        v: Velocity at its begin, or now.
+        a: Acceleration there.
+        length: Path length from there to the end.
+        wanted: The velocity to have at the end.
+        reachable: Largest velocity there from which a stop at the last end is possible.
+        acceleration: Bound.
+        jerk: Bound.
+    """
+    if a == 0.0 and wanted > v:
+        return min(wanted, _fastest(v, length, acceleration, jerk))
+    length += _TOLERANCE
+    if change_distance(v, a, wanted, acceleration, jerk) <= length:
+        return wanted
+    if wanted >= v + a * abs(a) / (2.0 * jerk):
+        return fastest_after(v, a, length, wanted, acceleration, jerk)
+    # After a change of the override, or of the path ahead, it slows down as fast as it may.
+    slowest = slowest_after(v, a, length, wanted, acceleration, jerk)
+    if slowest > reachable and change_distance(v, a, 0.0, acceleration, jerk) <= length:
+        return 0.0  # A change to standstill is shorter than one to a small velocity.
+    return slowest
 
 
 def _fastest(w: float, length: float, acceleration: float, jerk: float) -> float:

@@ -13,7 +13,6 @@ from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose, rotation_between, rotation_from_wxyz
 from rcilab.motion import _ruckig
 from rcilab.motion.hermite import central_state
-from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.sim.planner.mover import MotionState
 from rcilab.sim.planner.planner_event import Refusal
 from rcilab.sim.planner.preparation import PlannedArm, find_outside, refusal_of
@@ -71,7 +70,8 @@ class ToolMover:
         """
         bounds = tool_bounds(self._arm.limits.cartesian, speed)
         around = [self._poses(self._t + side * _STEP) for side in (-1.0, 0.0, 1.0)]
-        plan = _PosePlan(around, pose, bounds)
+        plan = _PosePlan(around, pose)
+        plan.compute(bounds)
         found = self._sample(plan)
         if isinstance(found, Refusal):
             return found
@@ -79,8 +79,7 @@ class ToolMover:
             factors = self._excess(plan, found)
             if max(factors) > 1.0:
                 v, a, j = factors
-                slower = Bounds(bounds.velocity / v, bounds.acceleration / a, bounds.jerk / j)
-                plan = _PosePlan(around, pose, slower)
+                plan.compute(Bounds(bounds.velocity / v, bounds.acceleration / a, bounds.jerk / j))
         self._plan, self._poses, self._t = plan, plan.at, 0.0
         return None
 
@@ -139,10 +138,9 @@ class _PosePlan:
     Args:
         around: Poses a step before, at, and a step after the start.
         goal: The pose.
-        bounds: Of translation and rotation.
     """
 
-    def __init__(self, around: Sequence[Pose], goal: Pose, bounds: Bounds) -> None:
+    def __init__(self, around: Sequence[Pose], goal: Pose) -> None:
         self._goal = goal
         positions = np.array([pose.parts[1] for pose in around]) - np.array(goal.parts[1])
         turns = np.array([rotation_between(goal.parts[0], pose.parts[0]) for pose in around])
@@ -154,11 +152,18 @@ class _PosePlan:
         self._axes = _axes_along(positions[1]), _axes_along(turns[1])
         before, here, after = np.hstack((positions @ self._axes[0], turns @ self._axes[1]))
         start, velocity, acceleration = central_state(before, here, after, step=_STEP)
-        v, a, j = (np.repeat(bound, 3) for bound in (bounds.velocity, bounds.acceleration, bounds.jerk))
-        self._curve: PiecewisePolynomial = _ruckig.plan_profile(
-            start, np.zeros(6), v, a, j, _without_noise(velocity), _without_noise(acceleration, 1e-5)
-        )
+        self._start = start, _without_noise(velocity), _without_noise(acceleration, 1e-5)
         self._rows: list[list[float]] = [axis.tolist() for axis in (*self._axes[0].T, *self._axes[1].T)]
+
+    def compute(self, bounds: Bounds) -> None:
+        """Computes the motion inside bounds of translation and rotation.
+
+        Raises:
+            PlanningError: The start is far beyond them.
+        """
+        start, velocity, acceleration = self._start
+        v, a, j = (np.repeat(bound, 3) for bound in (bounds.velocity, bounds.acceleration, bounds.jerk))
+        self._curve = _ruckig.plan_profile(start, np.zeros(6), v, a, j, velocity, acceleration)
 
     @property
     def duration(self) -> float:
@@ -200,11 +205,12 @@ def _axes_along(vector: Array) -> Array:
     size = float(np.linalg.norm(vector))
     if size < _SMALL:
         return np.eye(3)
-    first: Array = vector / size
-    other = np.eye(3)[int(np.abs(first).argmin())]
-    second = np.cross(first, other)
-    second /= np.linalg.norm(second)
-    return np.array((first, second, np.cross(first, second)), dtype=np.float64).T
+    x, y, z = (vector / size).tolist()
+    # Perpendicular to the axis of the base that is farthest from it.
+    a, b, c = min(((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0)), key=lambda axis: -hypot(*axis))
+    length = hypot(a, b, c)
+    a, b, c = a / length, b / length, c / length
+    return np.array(((x, a, y * c - z * b), (y, b, z * a - x * c), (z, c, x * b - y * a)))
 
 
 def _without_noise(values: Array, threshold: float = 1e-8) -> Array:
