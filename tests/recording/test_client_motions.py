@@ -312,7 +312,7 @@ def test_a_run_whose_commands_have_no_lateness_is_exported_without_one() -> None
     assert (run.timing.late, run.timing.lateness_p99, run.timing.lateness_max) == (0, None, None)
     assert "NaN" not in facts_text(run)
     facts = dict(fact_rows(run, Text("en", "rcilab.recording")))
-    assert facts["Timing"] == "0 cycles without a command, 0 late"
+    assert facts["Timing"] == "cycles without a command: 0, late ones: 0"
     assert "nan" not in run._repr_html_()
 
 

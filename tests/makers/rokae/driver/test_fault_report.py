@@ -79,12 +79,12 @@ def follow_filtered_poses(rows: np.ndarray) -> None:
 
 
 EXAMPLES = [
-    (leap, Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION, "joint 2, Joint velocity: 573°/s passes 124.6°/s"),
+    (leap, Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION, "Joint velocity, joint 2: 573°/s passes 124.6°/s"),
     (press, Fault.COLLISION, "external torque"),
     (lose, Fault.INSTABILITY_DETECTION, "25 % of the last second's commands"),
-    (reach_the_end, Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION, "joint 1, Joint position: 170.00°, allowed"),
+    (reach_the_end, Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION, "Joint position, joint 1: 170.00°, allowed"),
     (leave_the_box, Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION, "100.0 mm past the +x face"),
-    (follow_poses, Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION, "joint 3, Joint velocity: 573°/s passes 124.6°/s"),
+    (follow_poses, Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION, "Joint velocity, joint 3: 573°/s passes 124.6°/s"),
     (
         follow_filtered_poses,
         Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION,
