@@ -97,7 +97,7 @@ def format_ranges(group: ParameterGroup) -> str:
     units: dict[str, list[str]] = {}
     for (low, unit), highs in bounds.items():
         units.setdefault(f"{low:g}…{', '.join(highs)}", []).append(unit)
-    shown = (f"{ends} {', '.join(names)}" for ends, names in units.items())
+    shown = (f"{ends} {', '.join(names)}".rstrip() for ends, names in units.items())
     return f"[{', '.join(shown)}]"
 
 

@@ -48,7 +48,7 @@ class Ufactory:
         outputs=OUTPUTS,
         inputs=INPUTS,
         switches_power=True,
-        setup=("tool", "load"),
+        setup=("box", "tool", "load", "joints", "control"),
         longest_tool=LONGEST_TOOL,
     )
     timing = Timing(state_period=REPORT_PERIOD, command_period=REPORT_PERIOD)
@@ -58,8 +58,10 @@ class Ufactory:
         return UFACTORY_CONDITIONS
 
     def parameters(self, model: RobotModel) -> tuple[ParameterGroup, ...]:
-        """Returns no parameters."""
-        return ()
+        """Returns sensitivities and limits of planned motions."""
+        from rcilab.makers.ufactory.parameters import parameter_groups
+
+        return parameter_groups()
 
     def scenarios(self, model: RobotModel) -> tuple[FaultScenario, ...]:
         """Returns no scenarios."""

@@ -142,6 +142,8 @@ class XArmClient:
 
     def _call(self, name: str, call: Callable[..., Any], *arguments: Any, **options: Any) -> tuple[int, Any]:
         answer = call(*arguments, **options)
+        if isinstance(answer, list):  # Of a setter: the code alone.
+            answer = answer[0]
         code, values = answer if isinstance(answer, tuple) else (answer, None)
         if code in _LOST or code == _TIMED_OUT or not self.api.connected:
             reason = f"no answer within {_TIMEOUT:g} s" if self.api.connected else "it closed the connection"

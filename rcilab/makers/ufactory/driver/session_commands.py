@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from numpy.typing import ArrayLike
 
 from rcilab.core.errors import ModelError
+from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ConfiguredArm, RequestLock
@@ -27,7 +28,7 @@ class XArmSessionCommands(XArmSettings):
     """
 
     def __init__(self, connection: XArmConnection, arm: ConfiguredArm, lock: RequestLock) -> None:
-        super().__init__(connection)
+        super().__init__(connection, arm.model.name)
         self._arm = arm
         self._lock = lock
 
@@ -54,6 +55,24 @@ class XArmSessionCommands(XArmSettings):
             load = Payload(mass=mass, center_of_mass=center_of_mass, inertia=inertia)  # type: ignore[arg-type]
             model = self._arm.model.with_load(load)
             super().set_load(mass, center_of_mass, inertia)
+            self._arm.model = model
+
+    def set_boundary(self, box: SafetyBox) -> None:
+        """Sets the boundary of the tool; the session checks motions against it from then on."""
+        with self._lock.acquire("set_reduced_tcp_boundary"):
+            super().set_boundary(box)
+            self._arm.safety_box = box
+
+    def set_joint_ranges(self, lower: ArrayLike, upper: ArrayLike) -> None:
+        """Sets narrower ranges of the joints; the session's `model` has them from then on.
+
+        Args:
+            lower: Shape (n,), [rad], inside the arm's own range.
+            upper: Shape (n,), [rad].
+        """
+        with self._lock.acquire("set_reduced_joint_range"):
+            model = self._arm.model.with_joint_limits(lower, upper)
+            super().set_joint_ranges(lower, upper)
             self._arm.model = model
 
     def reboot(self) -> None:

@@ -16,17 +16,20 @@ from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import ControlError, InvalidValueError, RcilabError, UsageError
+from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.makers.driver import require_signal
 from rcilab.makers.setting_values import bounded_vector
 from rcilab.makers.ufactory.bounds import (
     INPUTS,
     JOINT_ACCELERATION,
+    JOINT_JERK,
     JOINT_VELOCITY,
     LONGEST_TOOL,
     OUTPUTS,
     SENSITIVITIES,
     TOOL_ACCELERATION,
+    TOOL_JERK,
 )
 from rcilab.makers.ufactory.driver.client import describe_error, faults_of
 from rcilab.makers.ufactory.driver.connection import XArmConnection
@@ -34,11 +37,15 @@ from rcilab.makers.ufactory.driver.state_reader import CHANGED, MOVING, READY, S
 from rcilab.makers.ufactory.wire.poses import MILLIMETRE, pose_as_mm_rpy, pose_from_mm_rpy
 from rcilab.model.dynamics.payload import Payload
 from rcilab.motion.path import build_arc
+from rcilab.robots import describe_robot
 
 _AXES = ("x", "y", "z")
 _FASTEST_TOOL = 1.0  # [m/s] The client library lowers a higher speed to it.
 _HEAVIEST_LOAD = 20.0  # [kg] rcilab's own bound, for kilograms given as grams.
 _QUIET = 5  # Reports without a motion until it has ended: the first one may be older than its command.
+_BOUNDARY = (-32768, 32767)  # [mm] Numbers of 16 bits.
+_ROUNDING = 1e-6  # [mm] Rounding of lengths that are whole millimetres.
+_SAME_ANGLE = 1e-6  # [rad]
 _READY, _PAUSE, _STOP = 0, 3, 4
 """States to set."""
 
@@ -51,14 +58,16 @@ class XArmSettings:
 
     Args:
         connection: The connection.
+        arm_name: Name of its arm.
     """
 
-    def __init__(self, connection: XArmConnection) -> None:
+    def __init__(self, connection: XArmConnection, arm_name: str) -> None:
         self._link = connection
         self._client = connection.client
         self._is_moving = False  # While a call waits for motions of the controller.
         self._is_stopped = False  # By `stop`, since that call began.
         self._joints = tuple(f"joint {number}" for number in range(1, connection.n + 1))
+        self._own_ranges = describe_robot(arm_name).limits.joint
 
     @property
     def api(self) -> Any:
@@ -109,6 +118,58 @@ class XArmSettings:
         """Sets the direction of gravity in base, for an arm that does not stand upright, shape (3,)."""
         values = bounded_vector("direction", direction, _AXES, "1", -1.0, 1.0)
         self._set("set_gravity_direction", values.tolist(), wait=False)
+
+    def set_boundary(self, box: SafetyBox) -> None:
+        """Sets the boundary of the tool (set_reduced_tcp_boundary), to whole millimetres inwards, and if it acts.
+
+        Raises:
+            InvalidValueError: The box is turned: the boundary has the axes of the base.
+        """
+        if not np.allclose(box.T_base_box.rotation, np.eye(3), atol=1e-6):
+            raise InvalidValueError("box", box, "is turned; the boundary has the axes of the base: leave the turn out")
+        middle, half = np.array(box.T_base_box.position), 0.5 * np.array(box.size)
+        largest = np.floor((middle + half) / MILLIMETRE + _ROUNDING).clip(*_BOUNDARY)
+        least = np.ceil((middle - half) / MILLIMETRE - _ROUNDING).clip(*_BOUNDARY)
+        self._set("set_reduced_tcp_boundary", np.column_stack((largest, least)).ravel().astype(int).tolist())
+        self._set("set_fence_mode", box.active)
+
+    def set_joint_ranges(self, lower: ArrayLike, upper: ArrayLike) -> None:
+        """Sets narrower ranges of the joints (set_reduced_joint_range) and reduced mode, which they act in.
+
+        Args:
+            lower: Shape (n,), [rad].
+            upper: Shape (n,), [rad]; the arm's own ranges end reduced mode.
+        """
+        low = bounded_vector("lower", lower, self._joints, "rad")
+        high = bounded_vector("upper", upper, self._joints, "rad")
+        own = self._own_ranges
+        is_reduced = bool((low > own.lower + _SAME_ANGLE).any() or (high < own.upper - _SAME_ANGLE).any())
+        self._set("set_reduced_joint_range", np.column_stack((low, high)).ravel().tolist())
+        self._set("set_reduced_mode", is_reduced)
+
+    def set_motion_limits(
+        self, joint_acceleration: float, joint_jerk: float, tool_acceleration: float, tool_jerk: float
+    ) -> None:
+        """Sets the largest accelerations and the jerks of motions that the controller plans.
+
+        Args:
+            joint_acceleration: Up to 20, [rad/s^2].
+            joint_jerk: Up to 500, [rad/s^3].
+            tool_acceleration: Up to 50, [m/s^2].
+            tool_jerk: Up to 100, [m/s^3].
+        """
+        wanted = (
+            ("set_joint_maxacc", "joint_acceleration", joint_acceleration, JOINT_ACCELERATION, "rad/s^2", 1.0),
+            ("set_joint_jerk", "joint_jerk", joint_jerk, JOINT_JERK, "rad/s^3", 1.0),
+            ("set_tcp_maxacc", "tool_acceleration", tool_acceleration, TOOL_ACCELERATION, "m/s^2", MILLIMETRE),
+            ("set_tcp_jerk", "tool_jerk", tool_jerk, TOOL_JERK, "m/s^3", MILLIMETRE),
+        )
+        checked = [
+            (name, float(bounded_vector(label, [value], ("",), unit, 0.0, most)[0]) / wire)
+            for name, label, value, most, unit, wire in wanted
+        ]
+        for name, value in checked:
+            self._set(name, value)
 
     def set_collision_sensitivity(self, value: int) -> None:
         """Sets the sensitivity to collisions, from 0 (off) to 5."""

@@ -84,7 +84,7 @@ class XArmDriver:
         self.simulation_address = None if address.world_port is None else (address.host, address.world_port)
         self.poll = connection.poll
         self._link = connection
-        self._settings = XArmSettings(connection)
+        self._settings = XArmSettings(connection, arm_name)
 
     @property
     def latest(self) -> RobotState | None:

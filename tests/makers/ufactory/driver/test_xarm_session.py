@@ -8,11 +8,23 @@ import numpy as np
 import pytest
 
 from rcilab.core.command import JointPosition
-from rcilab.core.errors import CommandRejectedError, ControlError, DeadlineError, InvalidValueError, ModelError
+from rcilab.core.errors import (
+    CommandRejectedError,
+    ControlError,
+    DeadlineError,
+    InvalidValueError,
+    ModelError,
+    PlanningError,
+    RcilabError,
+)
+from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotMode
 from rcilab.execution.session import connect
+from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, SoftJointLimits
+from rcilab.makers.parameters import default_parameters
 from rcilab.makers.ufactory.errors import UfactoryError
+from rcilab.makers.ufactory.parameters import parameter_groups
 from rcilab.motion import plan_joint
 from rcilab.recording.run import load_run
 from tests.makers.ufactory.driver.conftest import HOME
@@ -168,3 +180,53 @@ def test_signals_of_the_control_box(robot):
     robot.simulation.set_input(2, False)
     robot.set_output(3, True)
     robot.set_output(3, False)
+
+
+def test_the_safety_box_is_the_boundary_of_the_tool_in_whole_millimetres(robot):
+    middle = robot.model.forward(HOME).position
+    box = SafetyBox(size=(0.4, 0.5, 0.3005), T_base_box=Pose(middle.round(3)))
+    robot.configure(RobotConfiguration(box=box))
+    api = robot.xarm.api
+    x, y, z = (1e3 * middle.round(3)).round()
+    expected = [x + 200, x - 200, y + 250, y - 250, z + 150, z - 150]
+    assert api.reduced_tcp_boundary == expected
+    assert api.is_fence_mode
+    motion = plan_joint(robot.model, robot.state.q_c, HOME + 1.2 * np.eye(7)[0], speed=0.3)
+    with pytest.raises(RcilabError, match="box"):
+        robot.execute(motion)
+    turned = SafetyBox(size=(1.0, 1.0, 1.0), T_base_box=Pose.from_rpy((0.0, 0.0, 0.5), (0.0, 0.0, 0.1)))
+    with pytest.raises(InvalidValueError, match="is turned"):
+        robot.xarm.set_boundary(turned)
+    robot.xarm.set_boundary(SafetyBox(size=(3.0, 3.0, 3.0), T_base_box=Pose(), active=False))
+    assert robot.execute(motion).faults == ()
+
+
+def test_soft_limits_are_the_ranges_of_reduced_mode(robot):
+    own = robot.model.limits.joint
+    lower, upper = own.lower.copy(), own.upper.copy()
+    lower[0], upper[0] = -0.5, 0.5
+    robot.configure(RobotConfiguration(joints=SoftJointLimits(lower=tuple(lower), upper=tuple(upper))))
+    api = robot.xarm.api
+    assert api.is_reduced_mode
+    assert api.reduced_joint_limits[0] == pytest.approx([-0.5, 0.5])
+    with pytest.raises(PlanningError, match="28.65° is the soft limit that was set"):
+        plan_joint(robot.model, robot.state.q_c, HOME + 0.6 * np.eye(7)[0])
+    robot.xarm.set_joint_ranges(own.lower, own.upper)
+    assert not api.is_reduced_mode
+
+
+def test_parameters_are_sensitivities_and_limits_of_planned_motions(robot):
+    control = ControllerParameters(
+        collision_sensitivity=(1.0,), teach_sensitivity=(4.0,), motion_limits=(10.0, 100.0, 20.0, 5.0)
+    )
+    robot.configure(RobotConfiguration(control=control))
+    api = robot.xarm.api
+    assert (api.collision_sensitivity, api.teach_sensitivity) == (1, 4)
+    assert (api.joint_jerk, api.tcp_jerk) == pytest.approx((100.0, 5000.0))
+    with pytest.raises(InvalidValueError, match="whole number from 0 to 5"):
+        robot.configure(RobotConfiguration(control=ControllerParameters(teach_sensitivity=(2.5,))))
+    with pytest.raises(InvalidValueError, match="known: collision_sensitivity"):
+        robot.configure(RobotConfiguration(control=ControllerParameters(filters=(1.0,))))
+    defaults = default_parameters(parameter_groups())
+    robot.configure(RobotConfiguration(control=defaults))
+    assert (api.collision_sensitivity, api.teach_sensitivity) == (3, 3)
