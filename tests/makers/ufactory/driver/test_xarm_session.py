@@ -209,7 +209,7 @@ def test_soft_limits_are_the_ranges_of_reduced_mode(robot):
     api = robot.xarm.api
     assert api.is_reduced_mode
     assert api.reduced_joint_limits[0] == pytest.approx([-0.5, 0.5])
-    with pytest.raises(PlanningError, match="28.65° is the soft limit that was set"):
+    with pytest.raises(PlanningError, match=r"28\.65° is the soft limit that was set"):
         plan_joint(robot.model, robot.state.q_c, HOME + 0.6 * np.eye(7)[0])
     robot.xarm.set_joint_ranges(own.lower, own.upper)
     assert not api.is_reduced_mode
