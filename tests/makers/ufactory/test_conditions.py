@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -127,3 +129,11 @@ def test_codes_are_those_of_the_client_library():
     codes = pytest.importorskip("xarm.core.config.x_code")
     assert {error.value for error in UfactoryError} <= set(codes.ControllerErrorCodeMap)
     assert {warning.value for warning in UfactoryWarning} <= set(codes.ControllerWarnCodeMap)
+
+
+def test_the_documented_codes_are_all_of_them_with_their_causes_and_remedies():
+    text = (Path(__file__).parents[3] / "docs" / "ufactory.md").read_text(encoding="utf-8")
+    for fault in (*UfactoryError, *UfactoryWarning):
+        is_drive = 11 <= fault.value <= 17 and isinstance(fault, UfactoryError)
+        row = f"| C11 to C17 | {UfactoryError.JOINT_1.cause.replace('1', '1 to 7')} | {fault.remedy} |"
+        assert (row if is_drive else f"| {fault.manual_name} | {fault.cause} | {fault.remedy} |") in text
