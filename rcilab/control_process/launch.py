@@ -111,6 +111,8 @@ def _find_free_address(port: int) -> str:
         with socket.socket() as probe:
             try:
                 probe.bind((host, port))
+            except PermissionError:  # This user may not open it: the controller finds another way, or says so.
+                pass
             except OSError:  # Taken.
                 continue
         return host
