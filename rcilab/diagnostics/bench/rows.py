@@ -41,6 +41,7 @@ ROWS = MappingProxyType(
         "lockstep": "controller",
         "client_answer": "client",
         "jog": "compute",
+        "planner": "planner",
         "plan_line": "paths",
         "plan_arc": "paths",
         "replan": "paths",

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum
 from math import dist, inf
 
+import numpy as np
+
 from rcilab.core.arrays import as_vector
-from rcilab.core.errors import InvalidValueError, KinematicsError
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError, KinematicsError, PlanningError
 from rcilab.core.limits import Limits
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Remark
 from rcilab.model.robot_model import RobotModel
+from rcilab.motion.differences import derivatives_from_differences
 from rcilab.motion.twist import Frame
 from rcilab.sim.planner.joint_movers import JointMover, StopMover, StreamMover
 from rcilab.sim.planner.mover import MotionState, Mover
@@ -70,6 +74,7 @@ class Planner:
         self._queue = PathMotion(self._arm, q)
         self._mover: Mover | None = None
         self._q = list(q)
+        self._past = (self._q,) * 3  # The last angles, the newest first.
 
     def reset(self, q: Sequence[float]) -> None:
         """Discards all targets and stands at other joint angles, after something else has moved or stopped the arm.
@@ -82,6 +87,7 @@ class Planner:
         self._queue.set_override(self._override)
         self._mover = None
         self._q = list(q)
+        self._past = (self._q,) * 3
 
     def place(self, q: Sequence[float]) -> None:
         """Sets where the standing arm is before a motion begins, n plain floats, [rad]; queued targets wait.
@@ -90,6 +96,7 @@ class Planner:
         """
         if list(q) != self._q:
             self._q, self._mover = list(q), None
+            self._past = (self._q,) * 3
             self._queue.begin_at(q)
 
     def configure(self, model: RobotModel, limits: Limits) -> None:
@@ -167,6 +174,8 @@ class Planner:
         """Stops on the path, inside the speed of the target, and discards all targets (slow stop)."""
         if self._mover is not None:
             self.stop()
+        elif self._queue.is_stationary:
+            self._pending += self._queue.discard()
         else:
             self._queue.end()
 
@@ -235,7 +244,7 @@ class Planner:
         speed: JointSpeed = _FASTEST,
         is_synchronized: bool = True,
         duration: float | None = None,
-    ) -> None:
+    ) -> Refusal | None:
         """Moves the joints with constant velocities until the next command; at the end of its range a joint stops.
 
         Args:
@@ -244,15 +253,17 @@ class Planner:
             is_synchronized: Whether all joints reach their velocity at the same time.
             duration: Time after which it stops, [s]; None: it does not.
 
+        Returns:
+            Why the command is refused, without effect; None: it is followed.
+
         Raises:
             InvalidValueError: dq is not n finite numbers, or a speed is not valid.
-            PlanningError: The arm stands outside the range of a joint.
         """
         desired = as_vector(dq, self._arm.model.n, "dq", "rad/s").tolist()
         _require_speed(speed, self._arm.model.n)
-        mover = self._velocity_mover()
-        mover.set_joint_velocity(desired, speed, is_synchronized=is_synchronized, duration=duration)
-        self._take_over(mover)
+        return self._move_by_velocity(
+            lambda mover: mover.set_joint_velocity(desired, speed, is_synchronized=is_synchronized, duration=duration)
+        )
 
     def set_twist(
         self,
@@ -261,7 +272,7 @@ class Planner:
         speed: ToolSpeed = _FASTEST_TOOL,
         frame: Frame = "base",
         duration: float | None = None,
-    ) -> None:
+    ) -> Refusal | None:
         """Moves the tool with a constant twist until the next command, more slowly where a joint cannot follow.
 
         Args:
@@ -270,15 +281,15 @@ class Planner:
             frame: Axes of the twist: those of the base, or the moving ones of the tool.
             duration: Time after which it stops, [s]; None: it does not.
 
+        Returns:
+            Why the command is refused, without effect; None: it is followed.
+
         Raises:
             InvalidValueError: The twist is not six finite numbers, the frame is unknown, or a speed is not valid.
-            PlanningError: The arm stands outside the range of a joint.
         """
         desired = as_vector(twist, 6, "twist", "m/s, rad/s").tolist()
         _require_speed(speed, self._arm.model.n)
-        mover = self._velocity_mover()
-        mover.set_twist(desired, speed, frame, duration)
-        self._take_over(mover)
+        return self._move_by_velocity(lambda mover: mover.set_twist(desired, speed, frame, duration))
 
     def servo_joints(self, q: Sequence[float], *, velocity: float | None = None) -> Refusal | None:
         """Moves every joint by itself to the newest angles, with the largest acceleration and jerk.
@@ -413,21 +424,32 @@ class Planner:
             if current is not None:
                 events.append(PlannerEvent(current.id, EventKind.REFUSED, refusal_of(error, self.progress)))
             self.stop()
+        self._past = (self._q, *self._past[:2])
         return PlannerStep(self._q, tuple(events))
 
     def _running_state(self) -> MotionState:
-        return self._queue.state if self._mover is None else self._mover.state
+        try:
+            return self._queue.state if self._mover is None else self._mover.state
+        except KinematicsError:  # Beside a pose that cannot be reached.
+            q, q1, q2 = (np.array(row) for row in self._past)
+            dq, ddq = derivatives_from_differences((q - q1) / CYCLE_TIME, (q - 2.0 * q1 + q2) / CYCLE_TIME**2)
+            return MotionState(q.tolist(), dq.tolist(), ddq.tolist())
 
     def _take_over(self, mover: Mover) -> None:
         """Moves by another mover from the next step on; all targets are discarded."""
         self._mover = mover
         self._pending += self._queue.discard()
 
-    def _velocity_mover(self) -> VelocityMover:
+    def _move_by_velocity(self, command: Callable[[VelocityMover], None]) -> Refusal | None:
         mover = self._mover
-        if isinstance(mover, VelocityMover):
-            return mover
-        return VelocityMover(self._arm.model, self._arm.limits, self._running_state())
+        if not isinstance(mover, VelocityMover):
+            try:
+                mover = VelocityMover(self._arm.model, self._arm.limits, self._running_state())
+            except PlanningError as error:
+                return Refusal(reason=RefusalReason.JOINT_RANGE, remark=refusal_of(error, 0.0).remark)
+        command(mover)
+        self._take_over(mover)
+        return None
 
     def _outside(self, q: Sequence[float]) -> Refusal | None:
         limits = self._arm.limits.joint

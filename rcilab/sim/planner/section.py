@@ -14,7 +14,7 @@ from rcilab.core.spatial import Pose, rotation_from_wxyz
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.blend import Blend
 from rcilab.motion.hermite import DIFFERENCE_STEP, State, central_state
-from rcilab.motion.path import Path
+from rcilab.motion.path import Path, build_line
 from rcilab.sim.generators.ik_tracker import IkTracker
 from rcilab.sim.planner.guide import Guide
 
@@ -22,6 +22,7 @@ _LENGTH_STEP = 0.01  # [m] Between the samples of a path of the tool; a tuning v
 _ANGLE_STEP = 0.05  # [rad] The same for its rotation.
 _FEWEST, _MOST = 12, 400  # Intervals.
 _BLEND_INTERVALS = 16
+_LINE_STEPS = 10  # To a pose that is reached with another redundant joint.
 
 PosePath: TypeAlias = Callable[[float], Pose]
 """Pose of the tool in base at a share, 0 to 1."""
@@ -84,13 +85,24 @@ class PoseSolver:
             return self.nearest(pose, near) if q is None else q
 
     def nearest(self, pose: Pose, near: Sequence[float]) -> list[float]:
-        """Returns the joint angles of any pose, [rad]; a redundant joint, or the arm angle, stays that of `near`.
+        """Returns the joint angles of any pose, [rad].
+
+        A redundant joint, or the arm angle, stays that of `near` if the pose is within reach with it; otherwise the
+        joints move least on a straight line to the pose.
 
         Raises:
             KinematicsError: The pose is out of reach or singular.
         """
         psi = self._model.arm_angle(near) if self._is_redundant else 0.0
-        return self._tracker.solve(pose, psi, near)
+        try:
+            return self._tracker.solve(pose, psi, near)
+        except KinematicsError:
+            if not self._is_redundant:
+                raise
+        line, q = build_line(self._model.forward(near), pose), list(near)
+        for step in range(1, _LINE_STEPS + 1):
+            q = self._tracker.follow(line.at(step / _LINE_STEPS)[0], q)
+        return q
 
 
 class JointSection:

@@ -207,6 +207,16 @@ def test_a_queued_target_waits_for_standstill_and_a_command_discards_it(model: R
     assert events[-1][1].kind in (EventKind.DISCARDED, EventKind.REACHED)
 
 
+def test_velocities_outside_the_range_are_refused(model: RobotModel) -> None:
+    q = model.home.copy()
+    q[1] = model.limits.joint.upper[1] + 0.01
+    planner = Planner(model, model.limits, q.tolist())
+    for refusal in (planner.set_joint_velocity([0.1] * model.n), planner.set_twist([0.0, 0.0, 0.1, 0.0, 0.0, 0.0])):
+        assert refusal is not None
+        assert refusal.reason is RefusalReason.JOINT_RANGE
+    assert planner.state is PlannerState.IDLE
+
+
 def test_invalid_commands_are_errors(model: RobotModel) -> None:
     planner = planner_of(model)
     with pytest.raises(InvalidValueError):
