@@ -274,6 +274,7 @@ def _recording(folder: str | None, server: ArmServer) -> AbstractContextManager[
 def _config(options: Mapping[str, Any]) -> ControllerConfig:
     """Returns the configuration from options of the command line and the file: texts, or values of their types."""
     from rcilab.core.errors import UsageError
+    from rcilab.makers.maker import find_maker
     from rcilab.robots import describe_robot
     from rcilab.sim.controller_config import MOST_LOST, VENDOR_MODE_DELAY, ControllerConfig
 
@@ -283,6 +284,8 @@ def _config(options: Mapping[str, Any]) -> ControllerConfig:
             "the arm is not named; add --model NAME, such as --model xMatePro7, or a file with its configuration"
         )
     n = describe_robot(options["model"]).n
+    maker = find_maker(options["model"])
+    has_delay = maker is not None and "mode_delay" in maker.capabilities.options
     client_host, client_port = _client(option("client"))
     network, states_network = _networks(options)
     parent, is_lockstep = option("exit_with_parent"), option("lockstep", False)
@@ -301,11 +304,11 @@ def _config(options: Mapping[str, Any]) -> ControllerConfig:
         plant=option("plant", "ideal"),
         realism=option("realism", "off"),
         lockstep=is_lockstep,
-        mode_delay=option("mode_delay", None if is_lockstep else VENDOR_MODE_DELAY),
+        mode_delay=option("mode_delay", VENDOR_MODE_DELAY if has_delay and not is_lockstep else None),
         prefill=option("prefill"),
         patience=option("patience"),
         lost_limit=option("lost_limit", MOST_LOST) or None,  # 0 switches it off.
-        on_loss=option("on_loss", "hold"),
+        on_loss=option("on_loss"),
         auto_limit=option("auto_limit", False),
         loop_back=option("loop_back", False),
         fresh=option("fresh", False),

@@ -26,7 +26,7 @@ def simulate(
     lockstep: bool = True,
     record_all: bool = False,
     realism: str = "off",
-    on_loss: str = "hold",
+    on_loss: str | None = None,
     prefill: int | None = None,
 ) -> RobotSession:
     """Returns a session with a simulated arm; the simulation ends when the session is closed or garbage-collected.
@@ -38,7 +38,8 @@ def simulate(
             bit on any machine. False: the controller runs freely at 1 kHz, like a real one.
         record_all: Whether runs store every field of the state, three times as much; see `Run.cycles`.
         realism: "real": the joints of the MuJoCo plant have the friction and torque sensors of real ones; or "off".
-        on_loss: What the arm does while commands are missing: "hold" the last one, or "bridge" the gap.
+        on_loss: What the arm does while commands are missing: "hold" the last one, or "bridge" the gap; None: as the
+            maker's arms, "hold" for an xMate.
         prefill: Cycles by which commands are played later; None: none in lock-step, else 10; torques 2 in both.
 
     Raises:
@@ -48,8 +49,9 @@ def simulate(
     """
     require_simulator(require_model(model))
     require_plant(plant, realism)
-    require_loss_behaviour(on_loss)
-    options = ["--realism", realism, "--on-loss", on_loss]
+    options = ["--realism", realism]
+    if on_loss is not None:
+        options += ["--on-loss", require_loss_behaviour(on_loss)]
     if prefill is not None:
         options += ["--prefill", str(ControllerConfig(model=model.name, prefill=prefill).prefill)]
     controller = start_controller(model.name, plant, lockstep, options)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from rcilab.makers.driver import ExpectedArm, RobotAddress, StreamingDriver
     from rcilab.makers.parameters import ParameterGroup
     from rcilab.makers.scenario import FaultScenario
-    from rcilab.sim.controller_config import ControllerConfig
+    from rcilab.sim.controller_config import ControllerConfig, ControllerOption
     from rcilab.sim.maker_server import MakerServer
     from rcilab.sim.virtual_arm import VirtualArm
 
@@ -60,6 +60,8 @@ class Capabilities:
     """Whether a safety gate stops it, besides the emergency stop."""
     setup: tuple[SetupPart, ...] = ()
     """The parts of its configuration: safety box, tool, load, force-control frame, soft joint limits, parameters."""
+    options: tuple[ControllerOption, ...] = ()
+    """Options of its virtual controller that not every one has."""
     longest_tool: float = 2.0
     """Largest distance of tool, force-control frame and the load's centre of mass from the flange, [m]."""
 

@@ -33,6 +33,8 @@ def build_virtual_controller(
     model = require_simulator(load_model(config.model))
     maker = maker_of(model)
     assert maker is not None  # A simulated arm has one.
+    options = maker.capabilities.options
+    config.require_options(options)
     arm = VirtualArm(
         model,
         build_plant(config.plant, model, config.realism) if plant is None else plant,
@@ -40,16 +42,18 @@ def build_virtual_controller(
         torque_prefill=config.torque_prefill_cycles,
         skips_torques=not config.lockstep,
         lost_limit=config.lost_limit,
-        on_loss=config.on_loss,
+        on_loss="hold" if config.on_loss is None else config.on_loss,
         friction_watch=_friction_watch(model) if config.realism == "real" else None,
     )
     server = maker.build_server(arm, config)
+    if config.loop_back:
+        server.controller.loop_back = True
     setup = config.setup(tuple(model.home.tolist()))
     if setup is not None:
         server.controller.set_up(setup)
     for signal in config.inputs:
         server.controller.set_input(signal, True)
-    return ArmServer(server, config, log=log)
+    return ArmServer(server, config, options=options, log=log)
 
 
 def _friction_watch(model: RobotModel) -> FrictionWatch | None:

@@ -23,7 +23,7 @@ import ipaddress
 import logging
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from rcilab.core.clock import CYCLE_TIME, SystemClock
 from rcilab.core.cycle_ring import CycleRing
@@ -44,7 +44,7 @@ from rcilab.sim.arrivals import (
 )
 from rcilab.sim.channels import Peer
 from rcilab.sim.clock_stalls import StallSchedule
-from rcilab.sim.controller_config import ControllerConfig
+from rcilab.sim.controller_config import CONTROLLER_OPTIONS, ControllerConfig
 from rcilab.sim.cycle_capture import CycleCapture
 from rcilab.sim.cycle_timer import CycleTimer
 from rcilab.sim.endpoint import CLOSED, Endpoint
@@ -88,6 +88,7 @@ class ArmServer:
     Args:
         server: The maker's part: channels, codec, behaviour.
         config: The configuration.
+        options: Those of `CONTROLLER_OPTIONS` that the arm's controller has.
         log: Receives the entries of the log, and must not block; None: a thread writes them to stderr.
 
     Raises:
@@ -95,7 +96,12 @@ class ArmServer:
     """
 
     def __init__(
-        self, server: MakerServer, config: ControllerConfig, *, log: Callable[[LogEntry], None] | None = None
+        self,
+        server: MakerServer,
+        config: ControllerConfig,
+        *,
+        options: Collection[str] = CONTROLLER_OPTIONS,
+        log: Callable[[LogEntry], None] | None = None,
     ) -> None:
         self.config = config
         self.controller = server.controller
@@ -128,6 +134,7 @@ class ArmServer:
             self._clock,
             lambda: ServerCounters(self.missed, self.bad_datagrams, self._endpoint.unknown_senders),
             lambda: -1 if self.ring is None else self.ring.descriptor,
+            options,
             self._log.write,
         )
         self.ring: CycleRing | None = None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection
+from dataclasses import dataclass, field, fields, replace
 from typing import Literal, TypeAlias, get_args
 
 from rcilab.core.clock import CYCLE_TIME
@@ -23,6 +24,10 @@ ForceSign: TypeAlias = Literal["on-arm", "by-arm"]
 """Sign of reported external forces: exerted by the environment on the arm, or by the arm on the environment."""
 FORCE_SIGNS: tuple[ForceSign, ...] = get_args(ForceSign)
 
+ControllerOption: TypeAlias = Literal["auto_limit", "loop_back", "on_loss", "force_sign", "mode_delay"]
+"""Options that the controllers of some makers lack."""
+CONTROLLER_OPTIONS: tuple[ControllerOption, ...] = get_args(ControllerOption)
+
 DEFAULT_HOST = "127.0.0.2"
 """Loopback, but not the client's own address: a vendor's client may bind the UDP port of every address of its machine,
 as that of the RCI does, and would otherwise receive its own commands as states."""
@@ -38,6 +43,22 @@ VENDOR_MODE_DELAY = 1.05
 """For a vendor's client with any buffer, [s]: it sleeps for 1 s after StartMove, then answers the states in it."""
 
 FEWEST_LOST, MOST_LOST = 10, 20  # Manual 4.6: the packet-loss threshold is usually 10 to 20.
+
+
+def require_option(name: str, value: object, options: Collection[str], model: str) -> None:
+    """Requires that the controller of an arm has an option.
+
+    Args:
+        name: One of `CONTROLLER_OPTIONS`.
+        value: Its requested value.
+        options: Those that the controller has.
+        model: Name of the arm.
+
+    Raises:
+        InvalidValueError: It has not.
+    """
+    if name not in options:
+        raise InvalidValueError(name, value, f"cannot be set: the controller of {model} has no such option")
 
 
 def require_plant(plant: object, realism: object = "off") -> None:
@@ -91,9 +112,9 @@ class ControllerConfig:
     lost_limit: int | None = MOST_LOST
     """Lost commands in a row that are an instability, 10 to 20; None: no number is. While commands are held, one counts
     as lost when it is more than 30 cycles late."""
-    on_loss: LossBehaviour = "hold"
+    on_loss: LossBehaviour | None = None
     """What the arm does while commands are missing: it holds the last one, with the response of its servo, as a real
-    xMatePro3 does; or the motion is bridged, with the acceleration of the last commands."""
+    xMatePro3 does; or the motion is bridged, with the acceleration of the last commands. None: as the maker's arms."""
     auto_limit: bool = False
     """Whether commanded joint angles are stopped inside the soft limits, instead of raising a fault beyond them."""
     loop_back: bool = False
@@ -152,7 +173,8 @@ class ControllerConfig:
             raise InvalidValueError("force_sign", self.force_sign, f"is unknown; known: {', '.join(FORCE_SIGNS)}")
         if self.log_format not in LOG_FORMATS:
             raise InvalidValueError("log_format", self.log_format, f"is unknown; known: {', '.join(LOG_FORMATS)}")
-        require_loss_behaviour(self.on_loss)
+        if self.on_loss is not None:
+            require_loss_behaviour(self.on_loss)
         if self.mode_delay is not None and not 0.0 <= self.mode_delay <= 5.0:
             raise InvalidValueError("mode_delay", self.mode_delay, "needs 0 to 5 s")
         by_clock = not self.lockstep and self.patience == 0.0
@@ -166,6 +188,21 @@ class ControllerConfig:
                 self.lost_limit,
                 f"needs {FEWEST_LOST} to {MOST_LOST} cycles; 0 on the command line or in a file is no limit",
             )
+
+    def require_options(self, options: Collection[str]) -> None:
+        """Requires that only options are set that the arm's controller has.
+
+        Args:
+            options: Those of `CONTROLLER_OPTIONS` that it has.
+
+        Raises:
+            InvalidValueError: Another one is set; the message names it.
+        """
+        defaults = {option.name: option.default for option in fields(self)}
+        for name in CONTROLLER_OPTIONS:
+            value = getattr(self, name)
+            if value != defaults[name]:
+                require_option(name, value, options, self.model)
 
     def setup(self, home: Floats) -> ArmSetup | None:
         """Returns the configuration of the arm; None if it is that after delivery.

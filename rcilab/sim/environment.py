@@ -7,7 +7,7 @@ runs with the same requests at the same cycles have the same result.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import asdict, dataclass
 
 from rcilab.core.clock import Clock
@@ -44,6 +44,7 @@ from rcilab.sim.api import (
     WorldStatus,
 )
 from rcilab.sim.clock_stalls import StallSchedule
+from rcilab.sim.controller_config import CONTROLLER_OPTIONS, require_option
 from rcilab.sim.faulty_network import FaultyNetwork
 from rcilab.sim.force_profile import ForceProfile
 from rcilab.sim.maker_server import SimulatedController
@@ -70,6 +71,7 @@ class Environment:
         clock: Clock for the stalls.
         counters: Returns the counters of the server.
         record: Returns the descriptor of the record of all cycles; -1 without one.
+        options: Those of `CONTROLLER_OPTIONS` that the arm's controller has.
         log: Takes an entry of the log: kind, text and facts; None: there is no log.
     """
 
@@ -81,6 +83,7 @@ class Environment:
         clock: Clock,
         counters: Callable[[], ServerCounters],
         record: Callable[[], int] = lambda: -1,
+        options: Collection[str] = CONTROLLER_OPTIONS,
         log: Callable[..., None] | None = None,
     ) -> None:
         self._controller = controller
@@ -89,7 +92,7 @@ class Environment:
         self._stalls = stalls
         self._clock = clock
         self._counters = counters
-        self._record, self._log = record, log
+        self._record, self._log, self._options = record, log, options
         self._parameters = controller.arm.parameters
         self._setup = SetupInForce.of(self._parameters)  # Kept, because it takes longer than the rest of a status.
         self._push = ForceProfile()
@@ -138,12 +141,15 @@ class Environment:
                 what = f"digital input {signal} set {'high' if level else 'low'}, by the simulation port"
                 self._log_change(request, what)
             case LoopBack(on):
+                self._require_option(request, on)
                 self._controller.loop_back = on
             case AutoLimit(on):
+                self._require_option(request, on)
                 self._controller.auto_limit = on
             case Limits(table):
                 self._controller.limit_table = table
             case OnLoss(behaviour):
+                self._require_option(request, behaviour)
                 self._controller.arm.on_loss = require_loss_behaviour(behaviour)
                 what = f"on_loss set to {behaviour} from the next motion on, by the simulation port"
                 self._log_change(request, what)
@@ -170,6 +176,9 @@ class Environment:
                 self._log_change(request, describe_setup(request))
             case GetStatus():
                 pass  # Answered before; it changes nothing.
+
+    def _require_option(self, request: LoopBack | AutoLimit | OnLoss, value: object) -> None:
+        require_option(request.name, value, self._options, self._controller.arm.model.name)
 
     def _log_change(self, request: SetupRequest | OnLoss | SetInput, text: str) -> None:
         if self._log is not None:

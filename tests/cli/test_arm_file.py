@@ -220,6 +220,21 @@ def test_a_value_that_cannot_be_names_its_option_or_its_key(
     assert shown.count("\n") == 1
 
 
+@pytest.mark.parametrize("model", ["FR3", "RM65"])
+@pytest.mark.parametrize(
+    "option",
+    ["--on-loss hold", "--auto-limit", "--force-sign by-arm", "--mode-delay 0.2"],
+    ids=lambda text: text.split()[0],
+)
+def test_an_option_that_the_controller_of_an_arm_has_not_is_refused(
+    capsys: pytest.CaptureFixture[str], model: str, option: str
+) -> None:
+    assert main(["controller", "--model", model, "--port", "0", *option.split()]) == 2
+    shown = capsys.readouterr().err
+    assert shown.startswith(f"rcilab: {option.split()[0]}: ")
+    assert shown.endswith(f" cannot be set: the controller of {model} has no such option\n")
+
+
 @pytest.mark.parametrize(
     "arguments", [["--box", "1,1,1@0,0,3"], ["--soft-limits=-60:60,-10:10,-60:60,-60:60,-60:60,-60:60,-60:60deg"]]
 )

@@ -12,6 +12,7 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
+from rcilab.makers.maker import capabilities_of
 from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.makers.virtual_controller import build_virtual_controller
 from rcilab.model.robot_model import load_model
@@ -34,12 +35,15 @@ class Arena:
 
     def __init__(self, *, wrap_plant: Callable[[Any], Any] | None = None, **options: Any) -> None:
         self.entries: list[LogEntry] = []
-        settings = {"model": "xMatePro7", "port": 0, "realtime": False, "lockstep": True, "mode_delay": 0.005}
+        settings = {"model": "xMatePro7", "port": 0, "realtime": False, "lockstep": True}
+        model = load_model(options.get("model", "xMatePro7"))
+        if "mode_delay" in capabilities_of(model).options:
+            settings["mode_delay"] = 0.005
         if options.get("lockstep", True):
             settings["patience"] = 1.0  # A client that falls silent is given up.
             settings["prefill"] = 0  # Torques, too, act in the next cycle.
         config = ControllerConfig(**{**settings, **options})
-        plant = build_plant(config.plant, load_model(config.model))
+        plant = build_plant(config.plant, model)
         self.plant = plant if wrap_plant is None else wrap_plant(plant)
         self.server = build_virtual_controller(config, plant=self.plant, log=self.entries.append)
         self.cycle: RciController = self.server.controller

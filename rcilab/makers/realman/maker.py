@@ -31,7 +31,7 @@ class RealMan:
     scheme = "realman"
     robots = ROBOTS
     client_port = None
-    capabilities = Capabilities(simulates=True, longest_tool=LONGEST_TOOL)
+    capabilities = Capabilities(simulates=True, options=("loop_back",), longest_tool=LONGEST_TOOL)
     timing = Timing()
 
     def conditions(self) -> ConditionTable:

@@ -49,6 +49,7 @@ class Ufactory:
         inputs=INPUTS,
         switches_power=True,
         setup=("box", "tool", "load", "joints", "control"),
+        options=("loop_back",),
         longest_tool=LONGEST_TOOL,
     )
     timing = Timing(state_period=REPORT_PERIOD, command_period=REPORT_PERIOD)

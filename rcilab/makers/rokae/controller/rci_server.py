@@ -46,7 +46,6 @@ def build_rci_server(arm: VirtualArm, config: ControllerConfig) -> RciServer:
         coulomb=[joint.friction for joint in joints] if joints and config.realism == "real" else None,
     )
     controller.auto_limit = config.auto_limit
-    controller.loop_back = config.loop_back
     if config.limit_table is not None:
         controller.limit_table = config.limit_table
     port = DEFAULT_PORT if config.port is None else config.port

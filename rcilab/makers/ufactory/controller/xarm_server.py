@@ -47,7 +47,6 @@ _FUNCTIONS = frozenset(Function)
 def build_xarm_server(arm: VirtualArm, config: ControllerConfig) -> XArmServer:
     """Returns the server of an arm with a configuration."""
     controller = XArmController(arm)
-    controller.loop_back = config.loop_back
     return XArmServer(controller, CLIENT_PORT if config.port is None else config.port)
 
 

@@ -272,3 +272,16 @@ def test_old_repeated_and_early_commands_do_not_move_the_arm_twice(robot: Robot)
 def test_requests_one_after_the_other_without_reading_are_all_answered(robot: Robot) -> None:
     ids = [robot.request("stop_move") for _ in range(200)]
     assert [robot.response("stop_move", number).status for number in ids] == ["success"] * 200
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("on_loss", {"behaviour": "hold"}), ("loop_back", {"on": True}), ("auto_limit", {"on": True})],
+)
+def test_what_this_controller_has_not_is_refused_at_the_simulation_port(
+    place: FciArena, name: str, value: dict[str, object]
+) -> None:
+    answer = place.simulate(name, **value)
+    assert not answer["ok"]
+    assert f"the controller of {place.controller.model.name} has no such option" in answer["error"]
+    assert place.log("set_up") == []
