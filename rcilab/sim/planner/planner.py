@@ -446,7 +446,8 @@ class Planner:
             try:
                 mover = VelocityMover(self._arm.model, self._arm.limits, self._running_state())
             except PlanningError as error:
-                return Refusal(reason=RefusalReason.JOINT_RANGE, remark=refusal_of(error, 0.0).remark)
+                remark = Remark(str(error), "target_outside")
+                return Refusal(reason=RefusalReason.JOINT_RANGE, remark=remark)
         command(mover)
         self._take_over(mover)
         return None

@@ -318,9 +318,9 @@ def find_jump(before: Sequence[float], q: Sequence[float], share: float) -> Refu
 
 def refusal_of(error: RcilabError, share: float) -> Refusal:
     """Returns why a target is refused."""
-    reason = RefusalReason.GEOMETRY
+    reason, code = RefusalReason.GEOMETRY, "target_geometry"
     if isinstance(error, SingularError):
-        reason = RefusalReason.SINGULAR
+        reason, code = RefusalReason.SINGULAR, "target_singular"
     elif isinstance(error, KinematicsError):
-        reason = RefusalReason.UNREACHABLE
-    return Refusal(reason=reason, remark=Remark(str(error), "target_refused", reason=str(error)), share=share)
+        reason, code = RefusalReason.UNREACHABLE, "target_unreachable"
+    return Refusal(reason=reason, remark=Remark(str(error), code), share=share)
