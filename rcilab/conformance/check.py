@@ -187,7 +187,7 @@ def _report(
     found = sorted((v for _, violations in results for v in violations), key=lambda v: -v.ratio)
     facts = {"model": model.name, "law": motion.law, "duration": f"{motion.duration:.3f}", "speed": f"{motion.speed:g}"}
     return Report(
-        title=Phrase("title", **facts) if mode == "joint_position" else Phrase("title.in_mode", **facts, mode=mode),
+        title=_title(model, mode, facts),
         rows=tuple(result for result, _ in results),
         violations=tuple(v for v in found if v.condition.necessity == "necessary"),
         warnings=tuple(v for v in found if v.condition.necessity == "recommended"),
@@ -201,6 +201,14 @@ def _report(
         if torques is not None
         else partial(_report, model=model, start=start, box=box, distance=distance, mode=mode, record=record),
     )
+
+
+def _title(model: RobotModel, mode: Mode, facts: dict[str, str]) -> Phrase:
+    if mode != "joint_position":
+        return Phrase("title.in_mode", **facts, mode=mode)
+    table = model.description.conditions
+    cycles = 1 if table is None else table().command_cycles
+    return Phrase("title.sampled", **facts, period=str(cycles)) if cycles > 1 else Phrase("title", **facts)
 
 
 def _issue_none() -> None:

@@ -168,6 +168,8 @@ class ConditionTable:
     """For the commanded tool position with a safety box."""
     conditions: tuple[Condition, ...]
     """Every condition of the interface."""
+    command_cycles: int = 1
+    """Cycles from one command of a motion to the next: of its rows, only every so many are sent."""
 
     def rows(self, mode: Mode, *, has_elbow: bool = True, has_box: bool = False) -> tuple[Condition, ...]:
         """Returns the conditions on a motion in a mode, except those on distances.

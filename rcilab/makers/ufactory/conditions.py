@@ -27,8 +27,9 @@ from rcilab.conformance.common_conditions import (
     TOOL_CONDITIONS,
     TOOL_STANDSTILL_CONDITIONS,
 )
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition, ConditionTable, all_limits, symmetric_bounds
-from rcilab.makers.ufactory.bounds import SERVO_SPEED_FACTOR, SERVO_STEP
+from rcilab.makers.ufactory.bounds import REPORT_PERIOD, SERVO_SPEED_FACTOR, SERVO_STEP
 from rcilab.makers.ufactory.errors import UfactoryError
 
 _MANUAL = "user manual of UFACTORY Studio"
@@ -126,6 +127,7 @@ UFACTORY_CONDITIONS = ConditionTable(
     measured=_MEASURED,
     box=_BOX,
     conditions=tuple({row.id: row for row in (*_MOTION, _BOX, *_CARTESIAN, *_BEHAVIOUR)}.values()),
+    command_cycles=round(REPORT_PERIOD / CYCLE_TIME),
 )
 """The rows for `check` and the monitors."""
 

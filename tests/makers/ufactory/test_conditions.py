@@ -137,3 +137,9 @@ def test_the_documented_codes_are_all_of_them_with_their_causes_and_remedies():
         is_drive = 11 <= fault.value <= 17 and isinstance(fault, UfactoryError)
         row = f"| C11 to C17 | {UfactoryError.JOINT_1.cause.replace('1', '1 to 7')} | {fault.remedy} |"
         assert (row if is_drive else f"| {fault.manual_name} | {fault.cause} | {fault.remedy} |") in text
+
+
+def test_the_report_on_a_motion_says_how_often_its_angles_are_sent():
+    model = load_model("xArm6")
+    report = check(plan_joint(model, model.home, model.home + 0.1, speed=0.2), model)
+    assert str(report.title).endswith("of which the angles of every 5 ms are sent")
