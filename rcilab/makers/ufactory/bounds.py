@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi, radians
+from math import pi
 from typing import Final
 
 CLIENT_PORT: Final = 502
@@ -21,7 +21,7 @@ TOOL_ACCELERATION: Final = 50.0  # [m/s^2] User manual, 10.
 TOOL_JERK: Final = 100.0  # [m/s^3] User manual, 10.
 TOOL_ROTATION: Final = pi  # [rad/s] Protocol manual, 4: speeds of pure rotations are 0 to 180 deg/s.
 
-DEFAULT_JOINT_JERK: Final = radians(11459.0)  # [rad/s^3] User manual, 6.4.3, as the next.
+DEFAULT_JOINT_JERK: Final = 200.0  # [rad/s^3] User manual, 6.4.3 (11459 deg/s^3), as the next.
 DEFAULT_TOOL_JERK: Final = 7.0  # [m/s^3]
 SENSITIVITIES: Final = (0, 5)
 """Range of the sensitivities to collisions and to hand guiding."""

@@ -33,7 +33,7 @@ def parameter_groups() -> tuple[ParameterGroup, ...]:
                 _limit("tool_acceleration", TOOL_ACCELERATION, TOOL_ACCELERATION, "m/s²"),
                 _limit("tool_jerk", TOOL_JERK, DEFAULT_TOOL_JERK, "m/s³"),
             ),
-            modes=(),  # The targets of rcilab's own motions are not planned by the controller.
+            modes=MODES,
         ),
     )
 
