@@ -17,6 +17,7 @@ from rcilab.motion.stop import plan_stop
 STEADY = (
     0.01  # [rad/s^2] Below it a commanded velocity is constant: far above rounding, far below a motion's. A choice.
 )
+ROUNDING = 1e-9  # [rad/s] Far above that of a stationary arm under computed torques, about 1e-16.
 JOIN_SHARE = 2.0  # Upper bound for the start of a stop, in units of the arm's limits; a tuning value.
 
 
@@ -95,8 +96,12 @@ class ReferenceTrajectory:
         Args:
             q: Measured joint angles, n plain floats, [rad].
             dq: Their velocities, [rad/s].
-            ddq: Their accelerations, [rad/s^2]. Values above `JOIN_SHARE` times a limit are clipped.
+            ddq: Their accelerations, [rad/s^2]. Values above `JOIN_SHARE` times a limit are clipped. An arm that moves
+                by rounding alone is stationary.
         """
+        if max(map(abs, dq)) < ROUNDING and max(map(abs, ddq)) * CYCLE_TIME < ROUNDING:
+            self.reset(q)
+            return
         velocity, acceleration = differences_from_derivatives(
             np.clip(dq, -self._max_velocity, self._max_velocity),
             np.clip(ddq, -self._max_acceleration, self._max_acceleration),

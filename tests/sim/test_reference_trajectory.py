@@ -70,6 +70,13 @@ def test_joined_to_a_moving_arm_it_comes_to_rest_inside_acceleration_and_jerk(ve
     assert (np.abs(np.diff(rows, 3, axis=0)) * 1e9 < LIMITS.jerk).all()
 
 
+def test_joined_to_an_arm_that_moves_by_rounding_alone_it_rests_at_once() -> None:
+    commanded = ReferenceTrajectory(LIMITS, [0.1] * 7)
+    commanded.join([0.2] * 7, [1e-16] * 7, [1e-14] * 7)
+    assert commanded.is_stationary
+    assert commanded.q == [0.2] * 7
+
+
 def test_an_arm_that_was_thrown_beyond_reason_still_gets_a_stop() -> None:
     commanded = ReferenceTrajectory(LIMITS, [0.0] * 7)
     commanded.join([0.0] * 7, [500.0] * 7, [1e5] * 7)
