@@ -14,6 +14,7 @@ from rcilab.core.fault import FaultCode
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, Mode, RobotMode
 from rcilab.makers.configuration import RobotConfiguration
+from rcilab.model.dynamics.payload import Payload
 
 __all__ = ["MESSAGES", "PHASES", "Incident", "Lateness", "Phase", "SupervisorStatus", "cycle_dtype"]
 
@@ -132,6 +133,8 @@ class SupervisorStatus:
     """External wrench as estimated by the controller, base axes, shape (6,), [N, N m]."""
     T_flange_tool: Pose | None = None
     """The controller's tool, from the poses it reports at standstill; None while unknown."""
+    load: Payload | None = None
+    """The controller's load, without its inertia, as it reports it; None where it does not, or while unknown."""
     setup: RobotConfiguration = field(default_factory=RobotConfiguration)
     """The configuration that the controller has accepted since it was connected; it cannot be read back."""
     setup_times: int = 0

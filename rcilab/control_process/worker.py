@@ -284,6 +284,10 @@ class ControlProcess:
         driver = self._require_driver()
         self._model = configuration.applied_to(self._model)
         driver.configure(configuration)
+        load = driver.load
+        if load is not None:
+            x, y, z = load.center_of_mass.tolist()
+            self._status.update(load=(load.mass, x, y, z))
         self._report_ready()
 
     def _set_power(self, on: bool) -> None:

@@ -23,6 +23,7 @@ from rcilab.makers.maker import Maker, all_makers
 from rcilab.robots import DhRow
 
 if TYPE_CHECKING:
+    from rcilab.model.dynamics.payload import Payload
     from rcilab.model.robot_model import RobotModel
 
 GuideSpace: TypeAlias = Literal["joint", "cartesian"]
@@ -174,6 +175,11 @@ class Driver(Protocol):
     """Called with the states that arrive while the answer to a request is awaited, at least every 0.05 s."""
     poll: Callable[[float], list[RobotState]]
     """`poll(timeout)` returns every state that has arrived, oldest first; waits up to timeout, [s], for the first."""
+
+    @property
+    def load(self) -> Payload | None:
+        """The load that a client sets, as the controller reports it; None where it reports none."""
+        ...
 
     @property
     def latest(self) -> RobotState | None:

@@ -39,7 +39,8 @@ class ModeFields:
         self.mode: Any = shared_style_widget(
             ipywidgets.Dropdown, description=text("mode.choose"),
             options=[(text(f"mode.{mode}"), mode) for mode in MODES],
-            value=state.now.drive.mode, tooltip=text("mode.hint"), layout={"width": "24em"},
+            value=state.now.drive.mode, tooltip=text("mode.hint"), layout={"width": "26em"},
+            style={"description_width": "initial"},
         )  # fmt: skip
         self._note, self._missing, self._held, self._sentence = block(), block(), block(), block()
         self.fields: dict[str, list[NumberField]] = {}

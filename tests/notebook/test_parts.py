@@ -461,6 +461,11 @@ def test_a_soft_limit_of_six_characters_fits_its_field() -> None:
         assert width - label >= 5.6  # [em] "-170.0", and what surrounds it in a field.
 
 
+def test_the_label_of_the_mode_has_the_width_that_it_needs() -> None:
+    with notebook.RunPanel(PRO7) as panel:
+        assert panel.modes.mode.style.description_width == "initial"
+
+
 def test_a_slip_in_the_name_of_an_attribute_is_not_taken_in_silence():
     panel = notebook.TargetPanel(rcilab.load_model("xMatePro7"))
     with pytest.raises(AttributeError, match=r"TargetPanel has no languge; "):

@@ -100,6 +100,11 @@ class RciDriver:
         self._shown = MotionGeneratorMode.IDLE
 
     @property
+    def load(self) -> None:
+        """None: the interface does not report it."""
+        return None
+
+    @property
     def latest(self) -> RobotState | None:
         """The newest state."""
         return self.connection.latest

@@ -27,6 +27,7 @@ from rcilab.makers.ufactory.driver.state_reader import MOVING, READY, READY_MODE
 from rcilab.robots import describe_robot
 
 if TYPE_CHECKING:
+    from rcilab.model.dynamics.payload import Payload
     from rcilab.model.robot_model import RobotModel
 
 _SWITCHED = 2.0  # [s] For the motors to show that they are on or off; brakes take 0.2 s.
@@ -85,6 +86,11 @@ class XArmDriver:
         self.poll = connection.poll
         self._link = connection
         self._settings = XArmSettings(connection, arm_name)
+
+    @property
+    def load(self) -> Payload:
+        """The load that is set."""
+        return self._settings.load
 
     @property
     def latest(self) -> RobotState | None:

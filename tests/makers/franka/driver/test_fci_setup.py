@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rcilab.app.setup.configuration_state import describe_held
+from rcilab.app.text import Text
+from rcilab.control_process import Supervisor
 from rcilab.control_process.launch import start_controller
 from rcilab.core.command import JointPosition
 from rcilab.core.errors import CommandRejectedError, ControlError, InvalidValueError, ModelError, UsageError
@@ -19,7 +22,8 @@ from rcilab.makers.maker import parameters_of
 from rcilab.makers.parameters import default_parameters
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
-from tests.makers.franka.driver.conftest import ARMS
+from tests.makers.franka.driver.conftest import ARMS, NO_LIBRARY
+from tests.waiting import SOON
 
 LOAD = Payload(mass=1.0, center_of_mass=np.array([0.0, 0.0, 0.05]))
 TOOL = Pose(position=[0.01, 0.0, 0.12], wxyz=[0.92387953, 0.0, 0.0, -0.38268343])
@@ -55,6 +59,21 @@ def test_the_load_is_that_of_the_state_and_of_the_model(robot):
     assert not robot.fci.load.inertia.any()
     with pytest.raises(AttributeError, match=r"the requests of this robot's controller are in \.fci"):
         robot.rci  # noqa: B018
+
+
+@NO_LIBRARY
+def test_a_page_shows_the_load_that_the_controller_reports():
+    def shown(supervisor: Supervisor) -> str:
+        return Text("en").render(describe_held(supervisor.status(), "load"))
+
+    with Supervisor(load_model("FR3")) as supervisor:
+        supervisor.power_on().wait(SOON)
+        assert supervisor.status().setup.load is None
+        assert shown(supervisor) == "none"
+        supervisor.configure(RobotConfiguration(load=LOAD)).wait(SOON)
+        assert supervisor.status().load is not None
+        assert "1.00 kg" in shown(supervisor)
+        assert supervisor.status().load.center_of_mass == pytest.approx([0.0, 0.0, 0.05])
 
 
 def test_parameters_are_taken_and_bounds_named(robot):
