@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import NamedTuple
+from concurrent.futures import ThreadPoolExecutor, wait
+from typing import Any, NamedTuple, TypeVar
 
 from rcilab.core.fault import FaultCode
 from rcilab.core.spatial import IDENTITY, Pose
@@ -18,6 +19,8 @@ from rcilab.makers.ufactory.driver.report_receiver import ReportReceiver
 from rcilab.makers.ufactory.driver.state_reader import STOPPED, StateReader, shown_by
 from rcilab.makers.ufactory.errors import UfactoryError
 from rcilab.makers.ufactory.wire.poses import pose_from_mm_rpy
+
+Answer = TypeVar("Answer")
 
 _BUTTONS = (
     UfactoryError.EMERGENCY_STOP_BUTTON,
@@ -68,6 +71,7 @@ class XArmConnection:
         self.error = 0
         self._error_ns = 0
         self._receiver = receiver
+        self._asker = ThreadPoolExecutor(1, "requests")
         self._reader = StateReader(n)
         self._user_frame: tuple[tuple[float, ...], Pose] = (), IDENTITY
         self.latest: RobotState | None = None
@@ -104,6 +108,23 @@ class XArmConnection:
             self.on_states(self.poll(_WAIT))
         return True
 
+    def ask(self, call: Callable[..., Answer], *arguments: Any, **options: Any) -> Answer:
+        """Returns the result of a method of `client`; receives states meanwhile.
+
+        Args:
+            call: The method.
+            arguments: Its arguments.
+            options: Its keyword arguments.
+
+        Raises:
+            ConnectionLostError: The connection is lost.
+            CommandRejectedError: The controller refuses.
+        """
+        answer = self._asker.submit(call, *arguments, **options)
+        while not wait([answer], _WAIT).done:
+            self.on_states(self.poll(0.0))
+        return answer.result()
+
     def wait_for_slow_report(self) -> None:
         """Returns once a slow report has arrived that was sent after this call, or none comes any more."""
         slow, since = self.client, time.monotonic_ns() + _UNDERWAY_NS
@@ -120,6 +141,7 @@ class XArmConnection:
     def close(self) -> None:
         """Ends the connection. May be called twice."""
         self._receiver.close()
+        self._asker.shutdown(wait=False)
         self.client.close()
 
     def _read(self, report: bytes) -> RobotState:

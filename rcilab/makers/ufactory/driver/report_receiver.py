@@ -39,7 +39,7 @@ class ReportReceiver:
         self._link, self._name = link, name
         self._buffer = bytearray()
         self._kept: deque[bytes] = deque(maxlen=_KEPT)
-        self._failure: ConnectionLostError | None = None
+        self._failure = ""  # Why the connection is lost.
         self._polled = time.monotonic()
         self._ready = select.poll()
         self._ready.register(link, select.POLLIN)
@@ -86,8 +86,8 @@ class ReportReceiver:
 
     def _receive(self) -> None:
         """Reads what has arrived."""
-        if self._failure is not None:
-            raise self._failure
+        if self._failure:
+            raise ConnectionLostError(self._failure)
         try:
             received = self._link.recv(_BUFFER)
         except BlockingIOError:
@@ -108,10 +108,10 @@ class ReportReceiver:
         del self._buffer[:whole]
 
     def _lost(self, reason: str) -> ConnectionLostError:
-        self._failure = ConnectionLostError(
+        self._failure = (
             f"{self._name}: the connection is lost ({reason}); look whether the controller runs, and connect again"
         )
-        return self._failure
+        return ConnectionLostError(self._failure)
 
 
 def open_receiver(place: Place, name: str, timeout: float) -> ReportReceiver:

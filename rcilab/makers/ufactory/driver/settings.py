@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import JointVector
+from rcilab.core.arrays import JointVector, described
 from rcilab.core.errors import ControlError, InvalidValueError, RcilabError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose, as_pose
@@ -46,6 +46,7 @@ _QUIET = 5  # Reports without a motion until it has ended: the first one may be 
 _BOUNDARY = (-32768, 32767)  # [mm] Numbers of 16 bits.
 _ROUNDING = 1e-6  # [mm] Rounding of lengths that are whole millimetres.
 _SAME_ANGLE = 1e-6  # [rad]
+_MODES = (0, 1, 2, 4, 5, 6, 7)
 _READY, _PAUSE, _STOP = 0, 3, 4
 """States to set."""
 
@@ -183,18 +184,20 @@ class XArmSettings:
         """Sets a digital output of the control box: 0 to 7 are CO0 to CO7, 8 to 15 DO0 to DO7."""
         number = require_signal(signal, OUTPUTS)
         with self._request("set_cgpio_digital"):
-            self._client.request("set_cgpio_digital", self.api.set_cgpio_digital, number, int(level), sync=False)
+            self._call("set_cgpio_digital", number, int(level), sync=False)
 
     def read_input(self, signal: int) -> bool:
         """Returns the level of a digital input of the control box: 0 to 7 are CI0 to CI7, 8 to 15 DI0 to DI7."""
         number = require_signal(signal, INPUTS)
         with self._request("get_cgpio_digital"):
-            return bool(self._client.request("get_cgpio_digital", self.api.get_cgpio_digital, number))
+            return bool(self._call("get_cgpio_digital", number))
 
     def set_mode(self, mode: int) -> None:
-        """Sets a mode, 0 to 7, and makes the arm ready for its commands."""
+        """Sets a mode (0, 1, 2, 4, 5, 6 or 7) and makes the arm ready for its commands, as those of `api`."""
+        if mode not in _MODES:
+            raise InvalidValueError("mode", described(mode), f"does not exist; there are {', '.join(map(str, _MODES))}")
         with self._request("set_mode"):
-            self._client.enter(mode)
+            self._link.ask(self._client.enter, mode)
 
     def servo(self, q: JointVector) -> None:
         """Sends a target of mode 1; an arm that does not follow it says why in its reports."""
@@ -298,13 +301,16 @@ class XArmSettings:
 
     def _set(self, name: str, *values: Any, **options: Any) -> None:
         """Sends a setting and returns once the slow reports have it."""
-        client = self._client
         with self._request(name):
-            was_ready = client.request("get_state", self.api.get_state) < STOPPED
-            client.request(name, getattr(self.api, name), *values, **options)
+            was_ready = self._call("get_state") < STOPPED
+            self._call(name, *values, **options)
             if was_ready:
-                self._set_state(_READY)
+                self._call("set_state", _READY)
             self._link.wait_for_slow_report()
+
+    def _call(self, name: str, *values: Any, **options: Any) -> Any:
+        """Returns the values of a request of the library by the name of its method."""
+        return self._link.ask(self._client.request, name, getattr(self.api, name), *values, **options)
 
     def _in_user_frame(self, name: str, pose: object) -> tuple[float, ...]:
         T_base_tool = as_pose(pose, name)  # type: ignore[arg-type]  # Checked there.
@@ -312,7 +318,7 @@ class XArmSettings:
 
     def _move(self, name: str, wait: bool, **arguments: Any) -> None:
         with self._request(name):
-            self._client.command(name, getattr(self.api, name), wait=False, **arguments)
+            self._link.ask(self._client.command, name, getattr(self.api, name), wait=False, **arguments)
             if wait:
                 self._await_end()
 
@@ -336,7 +342,7 @@ class XArmSettings:
 
     def _is_still_stopped(self) -> bool:
         """Returns whether the arm is stopped now: a report may be older than the command."""
-        return self._client.request("get_state", self.api.get_state) == STOPPED
+        return bool(self._call("get_state") == STOPPED)
 
     def _stopped_error(self) -> ControlError:
         error = self._link.error

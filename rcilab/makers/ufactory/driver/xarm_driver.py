@@ -122,12 +122,14 @@ class XArmDriver:
 
     def power(self, on: bool, *, alongside: bool = False) -> None:
         """Switches the motors on or off; on, the arm is ready for motions in mode 0."""
-        client = self._link.client
-        client.request("motion_enable", client.api.motion_enable, on)
+        link, client = self._link, self._link.client
+        if alongside:
+            client.request("motion_enable", client.api.motion_enable, on)
+            return
+        link.ask(client.request, "motion_enable", client.api.motion_enable, on)
         if on:
-            client.enter(READY_MODE)
-        if not alongside:
-            self._link.wait(lambda: client.is_enabled is on, _SWITCHED)
+            link.ask(client.enter, READY_MODE)
+        link.wait(lambda: client.is_enabled is on, _SWITCHED)
 
     def is_powered(self, *, alongside: bool = False) -> bool:
         """Returns whether the motors of all joints are on, by a slow report: the newest one if `alongside`."""
@@ -142,9 +144,9 @@ class XArmDriver:
             DeadlineError: The error remains.
         """
         link, client = self._link, self._link.client
-        client.request("clean_error", client.api.clean_error)
-        client.request("clean_warn", client.api.clean_warn)
-        link.error = client.read_error()
+        link.ask(client.request, "clean_error", client.api.clean_error)
+        link.ask(client.request, "clean_warn", client.api.clean_warn)
+        link.error = link.ask(client.read_error)
         if link.error:
             text = describe_error(link.error)
             raise DeadlineError(f"{self.name}: {text}; it did not clear: remove its cause first").coded(
@@ -171,11 +173,11 @@ class XArmDriver:
         """
         if space == "cartesian" and kind != "free":
             raise ModelError("UFACTORY's interface frees the whole arm for hand guiding: it blocks no direction")
-        self._link.client.enter(TEACH_MODE)
+        self._link.ask(self._link.client.enter, TEACH_MODE)
 
     def stop_guiding(self) -> None:
         """Ends hand guiding; returns once the arm stands still."""
-        self._link.client.enter(READY_MODE)
+        self._link.ask(self._link.client.enter, READY_MODE)
         self._link.wait(lambda: self._link.shown.mode == READY_MODE and self._link.shown.state == READY, _REACTION)
 
     def set_output(self, signal: int, level: bool) -> None:
@@ -208,7 +210,8 @@ class XArmDriver:
         """
         if mode is not ControllerMode.JOINT_POSITION:
             raise InvalidValueError("mode", mode, "is not a mode to move in; there is JOINT_POSITION")
-        self._link.client.enter(SERVO_MODE)
+        self._link.ask(self._link.client.enter, SERVO_MODE)
+        self._link.client.hurry(True)
         self._link.is_streaming = True
 
     def has_begun(self, state: RobotState) -> bool:
@@ -226,12 +229,13 @@ class XArmDriver:
 
     def end(self, timeout: float | None = None) -> None:
         """Leaves mode 1; an arm that is stopped stays so."""
-        link = self._link
+        link, client = self._link, self._link.client
         link.is_streaming = False
+        client.hurry(False)
         is_ready = link.shown.state in (MOVING, READY)
-        link.client.request("set_mode", link.client.api.set_mode, READY_MODE)
+        link.ask(client.request, "set_mode", client.api.set_mode, READY_MODE)
         if is_ready:
-            link.client.request("set_state", link.client.api.set_state, 0)
+            link.ask(client.request, "set_state", client.api.set_state, 0)
 
     def find_safety_stop(self, state: RobotState) -> SafetyStopReason | None:
         """Returns the emergency stop if a state shows it."""

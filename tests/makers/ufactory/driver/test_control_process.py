@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import time
 from collections.abc import Iterator
 
@@ -10,7 +12,8 @@ import pytest
 
 from rcilab.conformance.check import check
 from rcilab.control_process import Supervisor
-from rcilab.core.errors import ControlError
+from rcilab.control_process.launch import start_controller
+from rcilab.core.errors import ConnectionLostError, ControlError
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.ufactory.errors import UfactoryError
 from rcilab.model.robot_model import load_model
@@ -124,3 +127,17 @@ def test_an_error_while_nothing_moves_is_shown_by_its_name(supervisor, world):
     world.press("none")
     supervisor.recover().wait(SOON)
     assert supervisor.status().faults == ()
+
+
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_controller_that_ends_or_freezes_in_a_motion_is_a_lost_connection(end):
+    controller = start_controller("xArm7")
+    with Supervisor(load_model("xArm7"), controller.address or "") as supervisor:
+        supervisor.power_on().wait(SOON)
+        _, request = begin(supervisor, 0.5, speed=0.05)
+        await_motion(supervisor)
+        os.kill(controller.pid or 0, end)
+        with pytest.raises(ConnectionLostError, match=r"the connection is lost|no state for"):
+            request.wait(SOON)
+        assert supervisor.status().code == "lost.closed"
+    controller.end()

@@ -174,6 +174,22 @@ def test_the_arm_is_guided_in_mode_2(robot):
         driver.start_guiding("cartesian", "translation")
 
 
+def test_the_library_commands_the_other_modes(robot):
+    commands = robot.xarm
+    with pytest.raises(InvalidValueError, match="mode: 3 does not exist; there are 0, 1, 2, 4"):
+        commands.set_mode(3)
+    commands.set_mode(4)
+    goal = HOME[0] + 0.05
+    commands.api.vc_set_joint_velocity([0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    while robot.receive_state().q[0] < goal:
+        pass
+    commands.stop()
+    commands.set_mode(0)
+    while np.abs(robot.receive_state().dq).max() > 0.0:
+        pass
+    assert goal <= robot.state.q[0] < goal + 0.1
+
+
 def test_signals_of_the_control_box(robot):
     robot.simulation.set_input(2, True)
     assert [robot.read_input(k) for k in (1, 2)] == [False, True]
