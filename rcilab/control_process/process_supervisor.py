@@ -119,10 +119,10 @@ class ProcessSupervisor:
     def _start_controller(self) -> None:
         maker = find_maker(self._model_name)
         is_patient = maker is not None and maker.timing.is_patient
+        has_delay = maker is not None and "mode_delay" in maker.capabilities.options
         prefill = [] if is_patient else ["--prefill", str(SUPERVISED_PREFILL)]
-        self._controller = VirtualController(
-            self._model_name, self._plant, options=[*prefill, "--mode-delay", str(MODE_DELAY)]
-        )
+        delay = ["--mode-delay", str(MODE_DELAY)] if has_delay else []
+        self._controller = VirtualController(self._model_name, self._plant, options=[*prefill, *delay])
 
     def _start_worker(self) -> None:
         counters = self._block.counters
