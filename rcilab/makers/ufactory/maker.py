@@ -65,8 +65,10 @@ class Ufactory:
         return parameter_groups()
 
     def scenarios(self, model: RobotModel) -> tuple[FaultScenario, ...]:
-        """Returns no scenarios."""
-        return ()
+        """Returns the scenarios of the errors of an arm."""
+        from rcilab.makers.ufactory.scenarios import scenarios_of
+
+        return scenarios_of(model.name)
 
     def parse_address(self, text: str) -> XArmAddress:
         """Returns the parts of an address, xarm://HOST."""
