@@ -13,6 +13,7 @@ from rcilab.model.robot_model import load_model
 pytest.importorskip("xarm", reason="the extra xarm is not installed")
 
 
+@pytest.mark.filterwarnings("ignore:The 'warn' method is deprecated")  # Of the client library, where a target fails.
 def test_errors_come_with_their_reason_and_the_arm_moves_again():
     with FaultLab("xArm6") as lab:
         for fault in (UfactoryError.SAFETY_BOUNDARY, UfactoryError.SELF_COLLISION):
