@@ -26,6 +26,7 @@ from rcilab.model.kinematics.manipulability import Manipulability, Manipulabilit
 from rcilab.model.kinematics.reaching_arm import ReachingArm
 from rcilab.model.kinematics.workspace import Workspace, sample_workspace
 from rcilab.robots import RobotDescription, describe_robot
+from rcilab.robots.description import MountedTool
 
 if TYPE_CHECKING:
     from rcilab.model.dynamics.rigid_body import RigidBody, TorqueTerms
@@ -102,6 +103,7 @@ class RobotModel(ReachingArm):
         tool: Pose = IDENTITY,
         load: Payload = NO_LOAD,
         stiffness_frame: Pose = IDENTITY,
+        mounted: MountedTool | None = None,
     ) -> None:
         super().__init__(description, tool, stiffness_frame)
         if not isinstance(load, Payload):
@@ -115,6 +117,8 @@ class RobotModel(ReachingArm):
                 "load_heavy", mass=f"{load.mass:g}", most=f"{description.rated_payload:g}", model=description.name
             )
         self.load = load
+        self.mounted = description.find_tool_at(self.T_flange_tool) if mounted is None else mounted
+        """The maker's tool at the flange, whose shape collisions include: that of `tool`, or of an earlier one."""
 
     @property
     def name(self) -> str:
@@ -139,14 +143,16 @@ class RobotModel(ReachingArm):
     def with_tool(self, tool: Pose | str) -> RobotModel:
         """Returns this arm with another tool, given by its pose in the flange frame (SetCoor).
 
-        A name, such as "hand", is that of a tool of the maker (`description.tools`), whose mass becomes the load.
+        A name, such as "hand", is that of a tool of the maker (`description.tools`), whose mass becomes the load and
+        whose shape collisions include. Another pose keeps that shape; the flange, `Pose()`, is without it.
 
         Raises:
             InvalidValueError: It is not a `Pose`, or not known by name.
         """
         if isinstance(tool, str):
             return RobotModel(self.description, *find_tool(self.description, tool), self.T_tool_stiffness)
-        return RobotModel(self.description, tool, self.load, self.T_tool_stiffness)
+        mounted = None if isinstance(tool, Pose) and tool.is_close(IDENTITY) else self.mounted
+        return RobotModel(self.description, tool, self.load, self.T_tool_stiffness, mounted)
 
     def with_load(self, load: Payload) -> RobotModel:
         """Returns this arm with another load (SetLoad).
@@ -154,7 +160,7 @@ class RobotModel(ReachingArm):
         Raises:
             InvalidValueError: It is not a `Payload`, or exceeds the rated payload.
         """
-        return RobotModel(self.description, self.T_flange_tool, load, self.T_tool_stiffness)
+        return RobotModel(self.description, self.T_flange_tool, load, self.T_tool_stiffness, self.mounted)
 
     def with_joint_limits(self, lower: ArrayLike, upper: ArrayLike) -> RobotModel:
         """Returns this arm with other bounds of its joint angles, such as soft limits (SetJointLimit).
@@ -180,7 +186,7 @@ class RobotModel(ReachingArm):
         joint = replace(limits.joint, lower=low, upper=high, own=limits.joint.own or limits.joint)
         limits = replace(limits, joint=joint, sources=MappingProxyType(sources))
         description = replace(self.description, limits=limits)
-        return RobotModel(description, self.T_flange_tool, self.load, self.T_tool_stiffness)
+        return RobotModel(description, self.T_flange_tool, self.load, self.T_tool_stiffness, self.mounted)
 
     def with_stiffness_frame(self, T_tool_stiffness: Pose) -> RobotModel:
         """Returns this arm with another stiffness frame, given by its pose in the tool frame (SetCoor).
@@ -190,7 +196,7 @@ class RobotModel(ReachingArm):
         Raises:
             InvalidValueError: It is not a `Pose`.
         """
-        return RobotModel(self.description, self.T_flange_tool, self.load, T_tool_stiffness)
+        return RobotModel(self.description, self.T_flange_tool, self.load, T_tool_stiffness, self.mounted)
 
     def elbow(self, q: ArrayLike) -> tuple[float, int]:
         """Returns the elbow as Franka defines it: angle of joint 3, [rad], and side of joint 4 relative to its flip.
@@ -308,7 +314,7 @@ class RobotModel(ReachingArm):
         from rcilab.model.kinematics.collision import collision_geometry
 
         tool = self.T_flange_tool.parts[1]
-        return collision_geometry(self.description, tool, distance.floor_height, distance.tool_radius)
+        return collision_geometry(self.description, tool, distance.floor_height, distance.tool_radius, self.mounted)
 
     @cached_property
     def rigid_body(self) -> RigidBody:

@@ -124,6 +124,8 @@ class MountedTool:
     """About the centre of mass, axes of the flange frame, shape (3, 3), [kg m^2]."""
     source: str
     """Source of pose, mass, centre and tensor."""
+    rods: tuple[Rod, ...] = ()
+    """Its shape in the flange frame, for collisions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,6 +200,10 @@ class RobotDescription:
     def n(self) -> int:
         """Number of joints."""
         return len(self.dh)
+
+    def find_tool_at(self, T_flange_tool: Pose) -> MountedTool | None:
+        """Returns the maker's tool whose frame is at a pose in the flange frame, within single precision, or None."""
+        return next((tool for tool in self.tools if tool.T_flange_tool.is_close(T_flange_tool, 1e-6)), None)
 
     def __repr__(self) -> str:
         mass = sum(link.mass for link in self.links)

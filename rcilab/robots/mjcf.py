@@ -13,8 +13,8 @@ import numpy as np
 
 from rcilab.core.arrays import Matrix, Vector3
 from rcilab.core.spatial import IDENTITY, Pose
-from rcilab.robots.description import Link, RobotDescription
-from rcilab.robots.shapes import ROLE_COLORS, Capsule, LinkShape, build_shapes
+from rcilab.robots.description import Link, MountedTool, RobotDescription
+from rcilab.robots.shapes import ROLE_COLORS, Capsule, LinkShape, build_shapes, tool_capsules
 from rcilab.robots.upright import upright_flange, upright_joints
 from rcilab.robots.urdf import mesh_file, number_text, vector_text
 
@@ -53,6 +53,7 @@ def build_mjcf(
     mesh_dir: str | None = None,
     T_flange_tool: Pose = IDENTITY,
     load: FlangeLoad | None = None,
+    mounted: MountedTool | None = None,
 ) -> str:
     """Returns the MJCF of an arm; without meshes it needs no other file.
 
@@ -65,6 +66,7 @@ def build_mjcf(
         mesh_dir: Folder of the meshes, relative to the MJCF file; default `meshes/NAME`.
         T_flange_tool: Pose of the tool in the flange.
         load: A body fixed to the flange; None, or one without mass, adds no body.
+        mounted: A tool of the maker, whose capsules are added to the last link; its mass is that of `load`.
     """
     directory = f"meshes/{description.name}" if mesh_dir is None else mesh_dir.rstrip("/")
     shape = build_shapes(description, "coarse")
@@ -94,6 +96,7 @@ def build_mjcf(
     T_link_flange = upright_flange(description)
     orientation = _orientation(T_link_flange)
     lines.append(f'{pad}<site name="flange"{orientation}/>')
+    lines += [pad + _capsule(capsule) for capsule in tool_capsules(description, mounted)]
     T_link_tool = T_link_flange @ T_flange_tool
     pose = f'pos="{vector_text(T_link_tool.position)}" quat="{vector_text(T_link_tool.wxyz)}"'
     lines.append(f'{pad}<site name="tool" {pose}/>')

@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 
 from rcilab.core.arrays import Array, Vector3, readonly_copy
-from rcilab.robots.description import RobotDescription, Rod
+from rcilab.robots.description import MountedTool, RobotDescription, Rod
 from rcilab.robots.mesh import Mesh, merge_meshes, mirror_y, revolve
 from rcilab.robots.rod_shapes import cast, flange_plate, foot_plate
 from rcilab.robots.surface import box, cut, cylinder, join, mesh_surface, rod, vase
@@ -105,6 +105,14 @@ _FINENESS = {
     "fine": _Fineness(cell=0.0095, segments=52),
     "coarse": _Fineness(cell=0.0180, segments=26),
 }
+
+
+def tool_capsules(description: RobotDescription, tool: MountedTool | None) -> tuple[Capsule, ...]:
+    """Returns the capsules of a mounted tool in the last link's frame; none without a tool."""
+    if tool is None:
+        return ()
+    R = upright_flange(description).rotation
+    return tuple(Capsule(readonly_copy(R @ rod.start), readonly_copy(R @ rod.end), rod.radius) for rod in tool.rods)
 
 
 @lru_cache(maxsize=16)

@@ -252,7 +252,8 @@ class MuJoCoPlant:
         mj: Any = mujoco
         mj.set_mju_user_warning(_log_warning)  # Otherwise MuJoCo writes a file into the user's directory.
         load = model.load if self._mounted is None else self._mounted
-        spec: Any = mj.MjSpec.from_string(build_mjcf(model.description, T_flange_tool=model.T_flange_tool, load=load))
+        text = build_mjcf(model.description, T_flange_tool=model.T_flange_tool, load=load, mounted=model.mounted)
+        spec: Any = mj.MjSpec.from_string(text)
         self._obstacles.add_to(spec, mj)
         self._mj, self._robot, self._n = mj, model, model.n
         self._model: Any = spec.compile()

@@ -17,7 +17,7 @@ from rcilab.motion.stop import plan_stop
 STEADY = (
     0.01  # [rad/s^2] Below it a commanded velocity is constant: far above rounding, far below a motion's. A choice.
 )
-ROUNDING = 1e-9  # [rad/s] Far above that of a stationary arm under computed torques, about 1e-16.
+RESTING = 1e-5  # [rad/s] Of a compliant arm that settles after commands of single precision, about 1e-6.
 JOIN_SHARE = 2.0  # Upper bound for the start of a stop, in units of the arm's limits; a tuning value.
 
 
@@ -96,10 +96,10 @@ class ReferenceTrajectory:
         Args:
             q: Measured joint angles, n plain floats, [rad].
             dq: Their velocities, [rad/s].
-            ddq: Their accelerations, [rad/s^2]. Values above `JOIN_SHARE` times a limit are clipped. An arm that moves
-                by rounding alone is stationary.
+            ddq: Their accelerations, [rad/s^2]. Values above `JOIN_SHARE` times a limit are clipped. Below `RESTING`
+                the arm is stationary.
         """
-        if max(map(abs, dq)) < ROUNDING and max(map(abs, ddq)) * CYCLE_TIME < ROUNDING:
+        if max(map(abs, dq)) < RESTING and max(map(abs, ddq)) * CYCLE_TIME < RESTING:
             self.reset(q)
             return
         velocity, acceleration = differences_from_derivatives(

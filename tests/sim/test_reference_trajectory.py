@@ -70,9 +70,9 @@ def test_joined_to_a_moving_arm_it_comes_to_rest_inside_acceleration_and_jerk(ve
     assert (np.abs(np.diff(rows, 3, axis=0)) * 1e9 < LIMITS.jerk).all()
 
 
-def test_joined_to_an_arm_that_moves_by_rounding_alone_it_rests_at_once() -> None:
+def test_joined_to_an_arm_that_settles_by_rounding_alone_it_rests_at_once() -> None:
     commanded = ReferenceTrajectory(LIMITS, [0.1] * 7)
-    commanded.join([0.2] * 7, [1e-16] * 7, [1e-14] * 7)
+    commanded.join([0.2] * 7, [2e-6] * 7, [1e-4] * 7)
     assert commanded.is_stationary
     assert commanded.q == [0.2] * 7
 

@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 from rcilab.core.arrays import Array, JointPath, JointVector, Vector3, readonly_copy
 from rcilab.core.clearance import FLOOR, TOOL, LinkPair
-from rcilab.robots.description import RobotDescription
-from rcilab.robots.shapes import Capsule, build_shapes
+from rcilab.robots.description import MountedTool, RobotDescription
+from rcilab.robots.shapes import Capsule, build_shapes, tool_capsules
 from rcilab.robots.upright import upright_flange, upright_joints
 
 _AXIS_THRESHOLD = 0.5  # Between the components of axes along y and along z.
@@ -55,15 +55,15 @@ class CollisionGeometry:
 
     Args:
         description: The arm.
-        tool: Capsule around the tool in the frame of the last link, or None.
+        tool: Capsules of the tool in the frame of the last link.
         floor_height: Height of the floor in the base frame, [m]; None without a floor.
     """
 
-    def __init__(self, description: RobotDescription, tool: Capsule | None, floor_height: float | None) -> None:
+    def __init__(self, description: RobotDescription, tool: tuple[Capsule, ...], floor_height: float | None) -> None:
         shape = build_shapes(description, "coarse")
         self.bodies = [link.capsules for link in (shape.base, *shape.links)]
-        if tool is not None:
-            self.bodies.append((tool,))
+        if tool:
+            self.bodies.append(tool)
         self.tree = _tree(description)
         n = description.n
         # The tool is fixed to the last link, so neither is compared with the neighbours of the other.
@@ -139,6 +139,7 @@ def collision_geometry(
     tool: tuple[float, float, float],
     floor_height: float | None,
     tool_radius: float | None,
+    mounted: MountedTool | None,
 ) -> CollisionGeometry:
     """Returns the geometry of an arm with a tool; cached.
 
@@ -147,12 +148,13 @@ def collision_geometry(
         tool: Origin of the tool in the flange, [m].
         floor_height: Height of the floor in the base frame, [m]; None without a floor.
         tool_radius: Radius of a capsule from the flange to the tool's origin, [m]; None without one.
+        mounted: A tool of the maker, with its own capsules; None without one.
     """
-    capsule = None
+    capsules = tool_capsules(description, mounted)
     if tool_radius is not None and any(tool):
         end = upright_flange(description).rotation @ np.array(tool)
-        capsule = Capsule(readonly_copy([0.0, 0.0, 0.0]), readonly_copy(end), tool_radius)
-    return CollisionGeometry(description, capsule, floor_height)
+        capsules = (*capsules, Capsule(readonly_copy([0.0, 0.0, 0.0]), readonly_copy(end), tool_radius))
+    return CollisionGeometry(description, capsules, floor_height)
 
 
 def _tree(description: RobotDescription) -> pin.Model:

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from rcilab.cli.arm_options import parse_tool_and_load
+from rcilab.core.clearance import LinkPair
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.makers.franka.controller.fci_controller import FciController
-from rcilab.makers.franka.wire.requests import SetLoad
+from rcilab.makers.franka.wire.command_packet import CommandPacket
+from rcilab.makers.franka.wire.requests import AsyncMove, Move, SetJointImpedance, SetLoad, SetNEToEE
 from rcilab.makers.franka.wire.state_packet import SLICES
-from rcilab.makers.franka.wire.versions import VERSION_10, Status
+from rcilab.makers.franka.wire.versions import VERSION_5, VERSION_10, Status
 from rcilab.model.robot_model import load_model
 from rcilab.sim.arm_setup import ArmSetup
 from rcilab.sim.plants import build_plant
@@ -78,3 +80,40 @@ def test_a_virtual_arm_with_the_hand_reports_it_as_end_effector_beside_the_load_
     assert shown("I_ee") == [0.001, 0.0, 0.0, 0.0, 0.0025, 0.0, 0.0, 0.0, 0.0017]
     assert shown("m_load") == [0.5]
     assert controller.settings.load.mass == pytest.approx(1.23)
+
+
+@ARMS
+def test_the_floor_and_boxes_see_the_hand(name: str) -> None:
+    bare, model = load_model(name), load_model(name, tool="hand")
+    flange = Pose([0.45, 0.0, 0.105], bare.forward(model.home).wxyz)  # The fingers are 7 mm below the floor.
+    q = bare.inverse(flange, psi=0.0).nearest(model.home)
+    assert bare.clearance(q).distance > 0.0
+    assert model.clearance(q).distance == pytest.approx(0.105 - 0.1124, abs=1e-4)
+    assert str(LinkPair(*model.clearance(q).links.tolist())) == "tool and floor"
+    assert model.with_tool(Pose([0.0, 0.0, 0.2])).clearance(q).distance < 0.0  # Another frame on the same hand.
+    assert model.with_tool(Pose()).clearance(q).distance > 0.0
+    assert model.clearance(model.home).distance > 0.05
+
+
+@ARMS
+def test_the_fingers_rest_on_a_table(name: str) -> None:
+    fr3 = load_model(name)
+    plant = build_plant("mujoco", fr3)
+    controller = FciController(VirtualArm(fr3, plant, prefill=0), VERSION_10 if name == "FR3" else VERSION_5)
+    tool, load = parse_tool_and_load("hand", None, name)
+    controller.set_up(ArmSetup(T_flange_tool=tool, load=load))
+    assert controller.set(SetNEToEE((*np.eye(4).ravel()[:14].tolist(), 0.02, 1.0)))[0] is Status.SUCCESS
+    x, y, tip = (controller.arm.signals.tool.pose @ Pose([0.0, 0.0, 0.009 - 0.02])).position
+    plant.place_box("table", [0.3, 0.3, 0.1], Pose([x, y, tip - 0.05 - 0.001]))  # 1 mm below the fingertips.
+    plant.push([0.0, 0.0, -20.0, 0.0, 0.0, 0.0])
+    assert controller.set(SetJointImpedance((100.0,) * 7))[0] is Status.SUCCESS
+    far = (10.0, 3.12, 6.28)
+    move = AsyncMove(0, 0, far, far) if name == "FR3" else Move(0, 0, far, far)
+    assert controller.begin_move(move) is Status.MOTION_STARTED
+    q, zero = tuple(controller.arm.commanded.q), (0.0,) * 7
+    for k in range(800):
+        rest = (0.0,) * 16, (0.0,) * 6, (0.0, -1.0), False, False, zero, False
+        controller.receive(CommandPacket(k, q, zero, *rest))
+        controller.step()
+    yielded = (controller.arm.signals.tool.pose @ Pose([0.0, 0.0, 0.009 - 0.02])).position[2] - tip
+    assert -2e-3 < yielded < -0.9e-3  # Without a body the fingers go down by some 50 mm.

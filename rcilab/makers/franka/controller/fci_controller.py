@@ -20,6 +20,7 @@ from rcilab.core.condition import Signal
 from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import IDENTITY
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.i18n.translator import Remark
 from rcilab.makers.franka.controller.error_of import errors_of
@@ -240,6 +241,8 @@ class FciController:
         settings = apply_setup(self.settings, setup, self.model.description)
         if setup.q is not None:
             require_stand(self.model.with_tool(settings.T_flange_tool), setup.q, settings, self.arm.plant)
+        if setup.T_flange_tool is not None:
+            self.arm.model = self.model.with_tool(IDENTITY)  # The shape of the tool before goes with it.
         self._configure(settings)
         if setup.q is not None:
             self.arm.reset(readonly_copy(setup.q))
@@ -475,7 +478,10 @@ class FciController:
 
     def _configure(self, settings: Settings) -> None:
         self.settings = settings
+        before = self.model.mounted
         self.arm.configure(settings)
+        if self.model.mounted is not before:
+            self._links = SelfCollisionWatch(self.model)
         self._reporter.configure(self.model, settings)
 
 

@@ -7,7 +7,7 @@ The flange looks down at zero pose. `PANDA_PAGE` is the maker's page for the Pan
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from math import cos, inf, pi, sin
+from math import cos, inf, pi, sin, sqrt
 from types import MappingProxyType
 from typing import Any
 
@@ -157,6 +157,22 @@ _RODS = (
     (_rod((0.0, 0.0, 0.100), (0.0, 0.0, 0.045), 0.045),),
 )  # After pictures of the arm: rounder than an xMate, and inside the real housings' reach.
 
+_OPEN = 0.03  # [m] Of each finger, between closed and open: rcilab's own choice, as the capsules.
+_DIAGONAL = sqrt(0.5)  # Of the hand's y axis, turned by -45 degrees, in the flange's.
+
+
+def _across(half: float, height: float, radius: float) -> Rod:
+    """Returns the body of the hand, along its y axis."""
+    y = _DIAGONAL * half
+    return _rod((-y, -y, height), (y, y, height), radius)
+
+
+def _finger(y: float) -> Rod:
+    """Returns a finger, 9 mm longer than the distance of the hand's frame."""
+    x = _DIAGONAL * y
+    return _rod((x, x, 0.066), (x, x, 0.1024), 0.01)
+
+
 HAND = MountedTool(
     name="hand",
     T_flange_tool=Pose((0.0, 0.0, 0.1034), (cos(pi / 8.0), 0.0, 0.0, -sin(pi / 8.0))),
@@ -164,6 +180,7 @@ HAND = MountedTool(
     center_of_mass=readonly_copy([-0.01, 0.0, 0.03]),
     inertia=readonly_copy(np.diag([0.001, 0.0025, 0.0017])),
     source="the state of an arm with its hand that the maker's client library shows on its page Getting started",
+    rods=(_across(0.0705, 0.033, 0.033), *(_finger(side * _OPEN) for side in (-1.0, 1.0))),
 )
 """The hand; its frame is between the fingertips, turned by -45 degrees."""
 
