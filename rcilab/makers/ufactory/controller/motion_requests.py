@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from math import hypot, inf, isinf, radians, tau
 from typing import Any, NamedTuple
@@ -209,21 +209,21 @@ def _follow(controller: XArmController, target: Target, task: int) -> None:
 def _servo(
     controller: XArmController, function: Function, values: tuple[Any, ...], task: int, answer: Answer
 ) -> Outcome:
-    begin: Callable[[Planner], Refusal | None]
-    if function is Function.SERVO_JOINT:
-        q = _joints(controller, values)
-        begin = partial(Planner.servo_joints, q=q)
-    else:
-        pose = _servo_pose(controller, function, values)
-        begin = partial(Planner.servo_tool, pose=pose, max_step=SERVO_STEP)
     if not controller.take_servo():
         return Outcome(answer, is_dropped=True)
-    controller.follow(task, begin)
+    if function is Function.SERVO_JOINT:
+        q = _joints(controller, values)
+        controller.follow(task, partial(Planner.servo_joints, q=q))
+        controller.end.begin(q)
+    else:
+        pose = _servo_pose(controller, function, values)
+        controller.follow(task, partial(Planner.servo_tool, pose=pose, max_step=SERVO_STEP))
+        controller.end.move(pose)
     return Outcome(answer)
 
 
 def _servo_pose(controller: XArmController, function: Function, values: tuple[Any, ...]) -> Pose:
-    end, user = controller.model.forward(controller.planner.q), controller.settings.T_base_user
+    end, user = controller.find_servo_end(), controller.settings.T_base_user
     if function is Function.SERVO_CARTESIAN:
         if values[8]:
             return tool_pose(values[:6], end, is_rotation_vector=False)

@@ -12,7 +12,7 @@ from rcilab.makers.ufactory.controller.motion_requests import MOTIONS, handle_mo
 from rcilab.makers.ufactory.controller.reporter import padded, user_pose
 from rcilab.makers.ufactory.controller.settings import MILLIMETRE, RESETTING, apply_setting
 from rcilab.makers.ufactory.controller.tasks import Task, Tasks
-from rcilab.makers.ufactory.controller.xarm_controller import XArmController
+from rcilab.makers.ufactory.controller.xarm_controller import TaskEvent, XArmController
 from rcilab.makers.ufactory.errors import UfactoryWarning
 from rcilab.makers.ufactory.wire.frame import Frame
 from rcilab.makers.ufactory.wire.functions import Function, encode_values
@@ -24,6 +24,7 @@ from rcilab.makers.ufactory.wire.poses import (
     pose_from_mm_rpy,
 )
 from rcilab.sim.channels import Peer
+from rcilab.sim.planner import EventKind
 from rcilab.sim.planner.preparation import refusal_of
 
 
@@ -34,6 +35,8 @@ class Reply(NamedTuple):
     is_invalid: bool = False
     is_refused: bool = False
     """Whether a motion command is refused, which a client sees as "not ready"."""
+    is_setting: bool = False
+    """Whether "not ready" is left out: the client library would take it for a refusal of a load."""
 
 
 class RequestHandlers:
@@ -55,6 +58,7 @@ class RequestHandlers:
         self._controller, self._identity, self._tasks, self._log = controller, identity, tasks, log
         self.feedback: dict[Peer, int] = {}
         self.io = IoRequests(controller)
+        self._loading: Peer | None = None  # Has just set a load, and may end its wish for feedback.
 
     def handle(self, peer: Peer, request: Frame, function: Function, values: tuple[Any, ...]) -> Reply:
         """Carries out a request; what is invalid raises a warning and changes nothing."""
@@ -68,7 +72,11 @@ class RequestHandlers:
                 if function in RESETTING:
                     self._controller.reset_state()
                 self._controller.configure(settings)
-                return Reply()
+                if function is not Function.SET_LOAD:
+                    return Reply()
+                self._trigger(peer, request)
+                self._loading = peer
+                return Reply(is_setting=True)
             return self._get(peer, request, function, values)
         except InvalidValueError as error:
             self._warn(function, UfactoryWarning.PARAMETER, str(error))
@@ -97,6 +105,11 @@ class RequestHandlers:
             return Reply(is_refused=True)
         return Reply(bytes((0, 0, outcome.error)))
 
+    def _trigger(self, peer: Peer, request: Frame) -> None:
+        """Sends the feedback of a request that is carried out at once."""
+        task = Task(peer, request, self.feedback.get(peer, 0), lambda: None)
+        self._controller.on_task(TaskEvent(self._tasks.add(task), EventKind.REACHED))
+
     def _handle_io(self, peer: Peer, request: Frame, function: Function, values: tuple[Any, ...]) -> Reply:
         act = IO_HANDLERS[function](self.io, values)
         if isinstance(act, bytes):
@@ -113,7 +126,8 @@ class RequestHandlers:
         match function:
             case Function.SET_FEEDBACK:
                 self.feedback[peer] = values[0]
-                return Reply()
+                after_load, self._loading = self._loading is peer, None
+                return Reply(is_setting=after_load)
             case Function.CHECK_FEEDBACK:
                 number = self._tasks.add(Task(peer, request, self.feedback.get(peer, 0)))
                 controller.queue_marker(number)

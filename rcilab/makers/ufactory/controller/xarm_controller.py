@@ -19,6 +19,7 @@ from rcilab.core.errors import UsageError
 from rcilab.core.fault import FaultCode
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
 from rcilab.i18n.translator import Remark
 from rcilab.makers.ufactory.bounds import SERVO_PERIOD
@@ -363,6 +364,12 @@ class XArmController:
         if self.planner.queued == 0:
             self.end.begin(self.planner.q)
         return self.end
+
+    def find_servo_end(self) -> Pose:
+        """Returns the pose of the newest servo target; that of the arm if it stands."""
+        if self.planner.state is not PlannerState.MOVING:
+            self.end.begin(self.planner.q)
+        return self.end.pose
 
     def queue(self, target: Target) -> None:
         """Appends a target.

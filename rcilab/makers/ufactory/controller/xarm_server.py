@@ -166,7 +166,7 @@ class XArmServer:
     def _status(self, reply: Reply) -> int:
         controller = self.controller
         status = STATUS_INVALID if reply.is_invalid else 0
-        if reply.is_refused or controller.shown_state in _NOT_READY:
+        if reply.is_refused or (controller.shown_state in _NOT_READY and not reply.is_setting):
             status |= STATUS_NOT_READY
         if controller.error is not None:
             status |= STATUS_ERROR

@@ -158,7 +158,8 @@ def test_another_setting_stops_the_arm_until_state_0(arm: Arm, function: Functio
     code, values = SETTINGS[function]
     arm.move_joints(AWAY)
     arm.step(100)
-    assert arm.call(function, code, *values)[0] == STATUS_NOT_READY
+    status, _ = arm.call(function, code, *values)
+    assert status == (0 if function is Function.SET_LOAD else STATUS_NOT_READY)
     assert arm.state == State.CHANGED
     arm.run()
     stood = arm.q
