@@ -247,11 +247,11 @@ def safety(host: str) -> object:
     codes = ready(arm)
     x, y, z = arm.get_position()[1][:3]
     codes.append(arm.set_reduced_tcp_boundary([x + 50, x - 50, y + 20, y - 50, z + 50, z - 50]))
-    codes.append(arm.set_fence_mode(True))
+    codes += arm.set_fence_mode(True)  # This one returns a list.
     refused = arm.set_position(y=y + 60, speed=200, wait=True)
     error = arm.get_err_warn_code()[1][0]
     codes += ready(arm)
-    codes.append(arm.set_fence_mode(False))
+    codes += arm.set_fence_mode(False)
     codes.append(arm.set_position(y=y, speed=200, wait=True))
     codes.append(arm.set_collision_sensitivity(4))
     codes.append(arm.set_tcp_load(0.5, [0, 0, 30], wait=True))
