@@ -6,6 +6,7 @@ import pytest
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.robots import ROBOT_NAMES
+from tests.arms import CLOSED_FORM
 
 
 @pytest.mark.parametrize("name", ROBOT_NAMES)
@@ -28,7 +29,7 @@ def test_a_target_beyond_reach_is_pulled_back_and_keeps_its_orientation(name):
     np.testing.assert_allclose(reach.pose.rotation, home.rotation, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ROBOT_NAMES)
+@pytest.mark.parametrize("name", CLOSED_FORM)
 def test_following_a_dragged_target_never_jumps(name):
     model = load_model(name)
     home = model.forward(model.home)

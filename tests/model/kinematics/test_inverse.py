@@ -13,7 +13,7 @@ from rcilab.makers.rokae.robots import ROBOTS
 from rcilab.model.kinematics.solvers.spherical.inverse import build_geometry, inverse_seven, inverse_six
 from rcilab.model.robot_model import load_model
 from rcilab.robots import ROBOT_NAMES
-from tests.arms import ANY_POSE
+from tests.arms import CLOSED_FORM
 
 POSES_PER_ARM = 2500  # 10 000 over the four arms.
 TOLERANCE = 1e-9  # [m] and rotation elements.
@@ -81,7 +81,7 @@ def test_a_singular_pose_gives_the_solution_nearest_to_where_the_arm_is(name):
         np.testing.assert_allclose(solution, q, atol=1e-7)
 
 
-@pytest.mark.parametrize("name", ANY_POSE)
+@pytest.mark.parametrize("name", CLOSED_FORM)
 @pytest.mark.parametrize("short", [0.0, 1e-12, 1e-9, 1e-6, 1e-3])
 def test_almost_stretched_poses_are_finite_and_exact(name, short):
     model = load_model(name)

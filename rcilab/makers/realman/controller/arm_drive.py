@@ -7,12 +7,14 @@ a client has set.
 from __future__ import annotations
 
 from dataclasses import replace
+from math import radians
 
 import numpy as np
 
-from rcilab.core.arrays import JointVector
+from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
+from rcilab.makers.realman.bounds import ANGLE_STEP
 from rcilab.motion.bounds import range_from
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arm_command import ArmCommand
@@ -20,6 +22,8 @@ from rcilab.sim.generators import CommandKind, MotionMode
 from rcilab.sim.planner import Planner, PlannerEvent, PlannerState
 from rcilab.sim.virtual_arm import StepResult, VirtualArm
 
+_ROUNDING = radians(ANGLE_STEP)  # [rad] An angle at the end of a range is inside it.
+_ALLOWANCE = 1.5  # Factor on accelerations: paths of the tool are planned from samples.
 _LINGER = 500  # [cycles] A motion ends when nothing has moved for so long: beginning one takes more than a cycle.
 _MODE = MotionMode(ControlLaw.POSITION, CommandKind.JOINT_ANGLES)
 
@@ -82,7 +86,8 @@ class ArmDrive:
         """Sets limits, zeros, and the tool of the arm; only while it is still."""
         arm = self.arm
         self._zero, self._limits = np.array(zero), limits
-        lower, upper = (tuple((bound + self._zero).tolist()) for bound in (limits.joint.lower, limits.joint.upper))
+        lower = tuple((limits.joint.lower + self._zero - _ROUNDING).tolist())
+        upper = tuple((limits.joint.upper + self._zero + _ROUNDING).tolist())
         arm.configure(replace(arm.parameters, joint_lower=lower, joint_upper=upper))
         self._restart()
 
@@ -134,7 +139,10 @@ class ArmDrive:
         arm = self.arm
         self._rest = 0
         arm.prepare_motion(_MODE)
-        arm.begin_motion(self._limits, checks_accelerations=False)
+        joint = self._limits.joint
+        acceleration = readonly_copy(_ALLOWANCE * joint.acceleration)
+        unchecked = replace(joint, acceleration=acceleration, jerk=np.full(arm.model.n, np.inf))  # Jerks have no error.
+        arm.begin_motion(replace(self._limits, joint=unchecked), checks_accelerations=False)
         arm.is_monitored = True
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from rcilab.conformance.limit_violation import LimitViolation
+from rcilab.makers.realman.conditions import REALMAN_CONDITIONS
 from rcilab.makers.realman.errors import JOINT_BITS, RealManError
 from rcilab.sim.planner import RefusalReason
 from rcilab.sim.violations import ArmCondition, ArmViolation, CycleViolation
@@ -13,6 +14,7 @@ _ARM_ERRORS = {
     ArmCondition.NO_COLLISION: RealManError.COLLISION,
     ArmCondition.VALID_POSE: RealManError.UNREACHABLE,
 }
+_FAULTS = {row.id: row.fault for row in REALMAN_CONDITIONS.conditions if isinstance(row.fault, RealManError)}
 REFUSALS = {
     RefusalReason.UNREACHABLE: RealManError.UNREACHABLE,
     RefusalReason.SINGULAR: RealManError.UNREACHABLE,
@@ -29,8 +31,7 @@ def errors_of(violations: Iterable[CycleViolation]) -> list[tuple[RealManError, 
         if isinstance(violation, ArmViolation):
             error = _ARM_ERRORS.get(violation.condition, RealManError.PLANNER_KERNEL)
         else:
-            fault = violation.condition.fault
-            error = fault if isinstance(fault, RealManError) else RealManError.PLANNER_KERNEL
+            error = _FAULTS.get(violation.condition.id) or RealManError.PLANNER_KERNEL
             joint = _joint_of(violation, error)
         if (error, joint) not in found:
             found.append((error, joint))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from math import pi
 from typing import Any
 
 import numpy as np
 
-from rcilab.core.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Remark
 from rcilab.makers.realman.controller.arm_drive import require_angles
@@ -19,6 +20,8 @@ from rcilab.makers.realman.controller.trajectories import Trajectory, Trajectory
 from rcilab.makers.realman.errors import RealManError
 from rcilab.makers.realman.wire.line import Request
 from rcilab.makers.realman.wire.units import angles_from_millidegrees, pose_from_wire
+from rcilab.model.kinematics.solvers.build import build_solver
+from rcilab.model.kinematics.solvers.numeric.solver import NumericSolver
 from rcilab.sim.channels import Peer
 from rcilab.sim.planner import (
     ArcTarget,
@@ -34,6 +37,7 @@ from rcilab.sim.planner import (
 _MICRO, _MILLI = 1e-6, 1e-3
 _AXES = ("x", "y", "z")
 _MOST_LOOPS = 1000
+_ARM_ANGLES = 24  # That are tried for an arm with 7 axes; a tuning value.
 
 
 def read_share(request: Request, name: str = "v") -> float:
@@ -104,8 +108,37 @@ def _movej(controller: RealManController, request: Request, peer: Peer) -> None:
 def _movej_p(controller: RealManController, request: Request, peer: Peer) -> None:
     speed, blend = joint_speed(controller, read_share(request)), _blend(request)
     pose = read_pose(controller, request.integers("pose", 6))
-    target = JointTarget(id=controller.trajectories.next_id(), pose=pose, speed=speed, blend=blend)
+    q = _solve(controller, pose)
+    target = JointTarget(id=controller.trajectories.next_id(), q=q, pose=None if q else pose, speed=speed, blend=blend)
     _add(controller, target, _trajectory("movej", request, peer))
+
+
+def _solve(controller: RealManController, pose: Pose) -> tuple[float, ...] | None:
+    """Returns the joint angles of a pose inside the ranges that are nearest to the standing arm.
+
+    None: the planner chooses, as behind other targets, or for an arm without a closed form.
+    """
+    model = controller.model
+    solver = build_solver(model.description)
+    if controller.drive.planner.queued or isinstance(solver, NumericSolver):
+        return None
+    near = controller.drive.q_c
+    T_base_flange = pose @ model.T_flange_tool.inverse()
+    angles = np.linspace(-pi, pi, _ARM_ANGLES, endpoint=False).tolist() if solver.redundancy else [0.0]
+    if solver.redundancy:
+        with suppress(KinematicsError):
+            angles.append(solver.redundancy_angle(near))
+    joint, best, smallest = controller.limits.joint, None, np.inf
+    for psi in angles:
+        with suppress(KinematicsError):
+            for branch in solver.at(T_base_flange, near).branches(psi):
+                q = np.array(branch)
+                q += 2.0 * pi * np.round((np.array(near) - q) / (2.0 * pi))  # Turns, where the range has some.
+                q = np.where((joint.lower <= q) & (q <= joint.upper), q, branch)
+                distance = float(np.abs(q - near).max())
+                if distance < smallest and ((joint.lower <= q) & (q <= joint.upper)).all():
+                    best, smallest = q, distance
+    return None if best is None else tuple(best.tolist())
 
 
 def _movel(controller: RealManController, request: Request, peer: Peer) -> None:

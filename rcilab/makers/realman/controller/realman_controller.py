@@ -33,6 +33,7 @@ from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.api import SafetyButton
 from rcilab.sim.arm_setup import ArmSetup, require_stand
 from rcilab.sim.planner import EventKind, PlannerState, Refusal, Target
+from rcilab.sim.self_collision import SelfCollisionWatch
 from rcilab.sim.violations import describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 
@@ -104,6 +105,8 @@ class RealManController:
         self.button: SafetyButton = "none"
         self.ignored = 0
         self._inputs = [False] * SIGNALS
+        self._links = SelfCollisionWatch(arm.model)
+        self._is_watching = False
         self._number = 0
         self.on_end: Callable[[Trajectory, bool, bool], None] = lambda trajectory, reached, continues: None
         self.on_log: Callable[[str, str], None] = lambda kind, text: None
@@ -374,6 +377,7 @@ class RealManController:
             for error, joint in errors_of(commands or measured):
                 self.set_error(error, self.reason, joint)
             self._end_all()
+        self._check_links()
         for event in self.drive.events:
             self._handle(event.id, event.kind, event.refusal)
         if self.streamed and self.drive.is_still:
@@ -391,6 +395,18 @@ class RealManController:
             self.on_log("refused", f"a trajectory was refused: {error.manual_name}: {refusal.remark}")
         if trajectory is not None:
             self.on_end(trajectory, kind is EventKind.REACHED, trajectory.is_followed_by_another)
+
+    def _check_links(self) -> None:
+        """Stops a motion in which links touch; an arm whose links touch may move them apart."""
+        q = self.arm.signals.measured.q
+        was_watching, self._is_watching = self._is_watching, self.arm.is_following
+        if not (self._is_watching and self.settings.avoids_self_collision):
+            return
+        if not was_watching:
+            self._links.begin(q)
+        touching = self._links.step(q)
+        if touching is not None:
+            self._fail(RealManError.SELF_COLLISION, touching)
 
     def _end_all(self) -> None:
         """Reports the end of every trajectory that a fault has discarded."""

@@ -121,7 +121,7 @@ class Settings:
     teach_in_tool: bool = False
     velocity_in_tool: bool = False
     """Axes of streamed velocities."""
-    avoids_self_collision: bool = True
+    avoids_self_collision: bool = False
     outputs: tuple[int, ...] = (0,) * SIGNALS
     init_pose: tuple[int, ...] = ()
     """[0.001 deg]."""

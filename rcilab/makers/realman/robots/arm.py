@@ -31,7 +31,7 @@ PACKAGE = "maker's public ROS 2 description package, inertials, in the axes of r
 
 _ACCELERATION = radians(100.0 * DEGREES_PER_TURN / SECONDS_PER_MINUTE)  # [rad/s^2] 100 RPM/s.
 _DISC_RADIUS, _DISC_REACH = 0.014, 0.018  # [m] Of the rods that make the disc of a flange.
-_RISE = 0.1  # [s] Time to full acceleration, from which the jerk follows: a choice of rcilab.
+_RISE = 0.01  # [s] Time to full acceleration, from which the jerk follows: a choice of rcilab.
 
 Figures = tuple[float, tuple[float, float, float], tuple[float, float, float, float, float, float]]
 """Mass [kg]; centre of mass in the link's frame [m]; Ixx, Ixy, Ixz, Iyy, Iyz, Izz about it [kg m^2]."""

@@ -6,6 +6,7 @@ Run by the tests in a process of its own: the library has threads of its own, an
 from __future__ import annotations
 
 import json
+import socket
 import sys
 import time
 from typing import Any
@@ -70,11 +71,51 @@ def motions(robot: Any, n: int) -> dict[str, Any]:
     return found
 
 
+def five(host: str, ports: list[int]) -> dict[str, Any]:
+    """Drives several robots, and receives the states that one pushes."""
+    from Robotic_Arm.rm_robot_interface import (
+        RoboticArm,
+        rm_realtime_arm_state_callback_ptr,
+        rm_realtime_push_config_t,
+        rm_thread_mode_e,
+        rm_udp_custom_config_t,
+    )
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("", 0))
+        push_port = free.getsockname()[1]
+    robots = [RoboticArm(rm_thread_mode_e.RM_TRIPLE_MODE_E), *(RoboticArm() for _ in ports[1:])]
+    for robot, port in zip(robots, ports, strict=True):
+        robot.rm_create_robot_arm(host, port, 3)
+    found: dict[str, Any] = {
+        "generations": [robot.rm_get_robot_info()[1]["robot_controller_version"] for robot in robots]
+    }
+    pushed: list[float] = []
+    callback = rm_realtime_arm_state_callback_ptr(lambda state: pushed.append(state.joint_status.joint_position[0]))
+    robots[0].rm_realtime_arm_state_call_back(callback)
+    robots[0].rm_set_realtime_push(rm_realtime_push_config_t(2, True, push_port, 0, host, rm_udp_custom_config_t()))
+    start = [0, -20, -70, 0, -90, 0]
+    found["moved"] = [robot.rm_movej([number, *start[1:]], 50, 0, 0, 1) for number, robot in enumerate(robots, 1)]
+    found["joint 1"] = [robot.rm_get_joint_degree()[1][0] for robot in robots]
+    found["offset"] = robots[-1].rm_movel_offset([0.0, 0.0, -0.02, 0.0, 0.0, 0.0], 50, 0, 0, 1, 1)
+    time.sleep(0.5)
+    found["pushed"] = len(pushed)
+    robots[0].rm_set_realtime_push(rm_realtime_push_config_t(2, False, push_port, 0, host, rm_udp_custom_config_t()))
+    time.sleep(0.1)  # The callback may still run.
+    for robot in robots:
+        robot.rm_delete_robot_arm()
+    return found
+
+
 def main() -> None:
-    """Runs a part in a thread mode: HOST PORT MODE PART."""
+    """Runs a part in a thread mode: HOST PORT MODE PART, or HOST PORT,PORT,... MODE five."""
     from Robotic_Arm.rm_robot_interface import RoboticArm, rm_thread_mode_e
 
-    host, port, mode, part = sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), sys.argv[4]
+    host, mode, part = sys.argv[1], int(sys.argv[3]), sys.argv[4]
+    if part == "five":
+        print("FOUND", json.dumps(five(host, [int(port) for port in sys.argv[2].split(",")])), flush=True)
+        return
+    port = int(sys.argv[2])
     robot = RoboticArm(rm_thread_mode_e(mode))
     handle = robot.rm_create_robot_arm(host, port, 3)
     info = robot.rm_get_robot_info()[1]

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -80,3 +81,26 @@ def test_motions_end_where_they_should_and_refusals_are_seen(served: tuple[str, 
     assert found["frames"][2] == "table"
     assert found["streamed"] == pytest.approx(10.0, abs=0.1)
     assert found["stop"] == [0, 0, 0, 0]
+
+
+def test_one_program_has_five_robots_of_both_generations_and_receives_their_states(tmp_path: Path):
+    options = [[], [], [], ["--generation", "4"], ["--generation", "4"]]
+    with ExitStack() as stack:
+        processes = [stack.enter_context(Process("--host", "127.0.0.1", *extra, model="RM65")) for extra in options]
+        command = [sys.executable, str(PROGRAM), "127.0.0.1", ",".join(str(p.port) for p in processes), "2", "five"]
+        output = subprocess.run(
+            command,
+            capture_output=True,
+            text=True,
+            timeout=LONGEST,
+            check=True,
+            env={"HOME": str(tmp_path)},
+            cwd=tmp_path,
+        ).stdout
+    (line,) = (line for line in output.splitlines() if line.startswith("FOUND "))
+    found = json.loads(line.removeprefix("FOUND "))
+    assert found["generations"] == [3, 3, 3, 4, 4]
+    assert found["moved"] == [0] * 5
+    assert found["joint 1"] == pytest.approx([1.0, 2.0, 3.0, 4.0, 5.0], abs=0.01)
+    assert found["offset"] == 0
+    assert found["pushed"] > 10

@@ -41,6 +41,23 @@ def test_the_tool_arrives_at_its_pose_and_the_client_is_told_once(model, command
     }
 
 
+def test_a_pose_is_reached_inside_the_ranges_also_across_the_turn_of_joint_1():
+    bench = Bench("RM75")
+    assert bench.ask("movej_p", pose=[-300000, 0, 300000, 3142, 0, 0], v=100)["receive_state"] is True
+    assert bench.run_until_event()["trajectory_state"] is True
+    np.testing.assert_allclose(bench.pose[:3], [-300000, 0, 300000], atol=1)
+
+
+def test_the_ends_of_a_range_can_be_reached():
+    bench = Bench()
+    ends = [178000, -130000, 135000, 178000, 128000, 360000]
+    assert bench.ask("movej", joint=ends, v=100)["receive_state"] is True
+    assert bench.run_until_event()["trajectory_state"] is True
+    assert bench.q == ends
+    bench.run(600)
+    assert not bench.controller.faults
+
+
 @ARMS
 def test_joints_keep_their_limits_and_v_is_their_share(model):
     bench = Bench(model)
@@ -302,6 +319,45 @@ def test_the_emergency_stop_ends_a_motion_and_refuses_the_next():
     bench.controller.press_button("none")
     assert bench.ask("movej", joint=q, v=50)["receive_state"] is True
     assert bench.run_until_event()["trajectory_state"] is True
+
+
+def test_links_that_would_touch_stop_the_arm_until_the_error_is_cleared():
+    bench = Bench()
+    assert bench.ask("set_self_collision_enable", set_enable=True)["set_state"] is True
+    folded = [0, -130000, 135000, 0, 128000, 0]
+    assert bench.ask("movej", joint=folded, v=50)["receive_state"] is True
+    assert bench.run_until_event()["trajectory_state"] is False
+    assert bench.err == [RealManError.SELF_COLLISION]
+    bench.run(1000)
+    assert bench.ask("movej", joint=FRONT["RM65"], v=50)["receive_state"] is False
+    assert bench.ask("clear_system_err")["clear_state"] is True
+    assert bench.ask("movej", joint=FRONT["RM65"], v=50)["receive_state"] is True
+    assert bench.run_until_event()["trajectory_state"] is True
+
+
+def test_generations_differ_in_what_they_say_about_themselves():
+    third, fourth = (Bench(generation=generation).ask("get_arm_software_info") for generation in (3, 4))
+    assert "robot_controller_version" not in third
+    assert third["plan_info"]
+    assert fourth["robot_controller_version"] == "4.0"
+    assert fourth["program_info"]
+    assert third["Product_version"] == "RM65-B"
+
+
+def test_the_table_of_the_geometry_is_the_makers():
+    table = Bench("RM75").ask("get_DH_data")
+    assert table["joint_1"] == [-90000, 0, 240500, 0]
+    assert Bench().ask("get_DH_data")["joint_3"] == [0, 256000, 0, 90000]
+
+
+def test_outputs_are_wired_to_inputs_on_request():
+    bench = Bench()
+    assert bench.ask("set_DO_state", IO_Num=2, state=1)["set_state"] is True
+    assert bench.ask("get_IO_output")["DO"] == [0, 1, 0, 0]
+    assert bench.ask("get_IO_input")["DI"] == [0, 0, 0, 0]
+    bench.controller.loop_back = True
+    assert bench.ask("get_IO_input")["DI"] == [0, 1, 0, 0]
+    assert bench.ask("set_DO_state", IO_Num=5, state=1)["set_state"] is False
 
 
 def test_states_are_pushed_at_their_period():
