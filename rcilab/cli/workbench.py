@@ -33,7 +33,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Adds the options, for `rcilab workbench` and for a bare `rcilab`."""
     parser.add_argument("--model", default="xMatePro7", help="initial arm (default: %(default)s)")
     parser.add_argument(
-        "--robot", default="virtual", metavar="ADDRESS", help="controller to connect to: rci://HOST:PORT, fci://HOST"
+        "--robot",
+        default="virtual",
+        metavar="ADDRESS",
+        help="controller to connect to: rci://HOST:PORT, fci://HOST, xarm://HOST",
     )
     add_page_options(parser)
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import time
 from collections.abc import Callable
-from contextlib import redirect_stdout, suppress
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 from rcilab.core.errors import CommandRejectedError, ConnectionLostError
@@ -62,8 +61,7 @@ class XArmClient:
             self._receive, report_cartesian=False, report_joints=False, report_mtbrake=False, report_cmd_num=False
         )
         try:
-            with redirect_stdout(io.StringIO()):
-                self.api.connect()
+            self.api.connect()
         except Exception as error:  # The library raises the base class.
             self.close()
             raise ConnectionLostError(f"{name}: the client library does not connect ({error}); try again") from error
