@@ -322,6 +322,6 @@ def test_the_label_of_the_target_is_broken_into_lines(language: str) -> None:
     reason = text("reach.both", first=text("plan.here"), second=text("plan.watched"))
     lines = folded(reason).split("\n")
     assert len(lines) > 1
-    assert max(len(line) for line in lines) <= 44
+    assert max(len(line) for line in lines) <= 30
     assert not any(line[0] in "，。；" for line in lines)
     assert "".join(lines).replace(" ", "") == reason.replace(" ", "")

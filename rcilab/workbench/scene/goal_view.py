@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 TONE_COLORS = {"good": (38, 166, 91), "warn": (240, 150, 20), "bad": (214, 48, 38)}
 _VIA_COLOR = (11, 111, 194)
 _GIZMO_SCALE = 0.26  # [m]
-_COLUMNS = 44  # Of a line of the label, about 300 px; a Chinese character takes two.
+_COLUMNS = 30  # Of a line of the label, at most 208 px: the scene of a narrow window. A Chinese character takes two.
 _WIDE = "\u2e80-\u9fff\uff00-\uffef"
 _PIECES = re.compile(f"[{_WIDE}][，。；：！？）”%]*|[^\\s{_WIDE}]+|\\s+")  # No line begins with a closing mark.
 
