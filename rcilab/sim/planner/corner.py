@@ -63,8 +63,10 @@ class CornerPreparation:
         """Computes the next slice."""
         sampling = self._sampling
         try:
-            if sampling is None:
-                self._begin()
+            if self._blend is None:
+                self._build()
+            elif sampling is None:
+                self._begin(self._blend)
             elif not sampling.is_done:
                 sampling.advance()
             else:
@@ -72,19 +74,26 @@ class CornerPreparation:
         except KinematicsError:
             self.is_done = True
 
-    def _begin(self) -> None:
-        model = self._arm.model
+    def _build(self) -> None:
+        before, after = self._sides
+        blend = build_blend(self._arm.model, before, after, self._radius(before, after))
+        if 1.0 - blend.exit_share < _SHORTEST or blend.entry_share < _SHORTEST:
+            self.is_done = True
+        self._blend = blend
+
+    def _begin(self, blend: Blend) -> None:
+        model, (before, after) = self._arm.model, self._sides
+        left = _by_blend(before.state(model, blend.exit_share), 2.0 * (1.0 - blend.exit_share))
+        right = _by_blend(after.state(model, blend.entry_share), 2.0 * blend.entry_share)
+        self._section = blend_section(blend, left, right, self._arm.solver)
+        self._sampling = Sampling(self._section, left[0].tolist(), self._arm.limits.joint)
+
+    @property
+    def _sides(self) -> tuple[_Side, _Side]:
         before, after = self._before.section, self._after.section
         assert isinstance(before, _Side)
         assert isinstance(after, _Side)
-        blend = build_blend(model, before, after, self._radius(before, after))
-        if 1.0 - blend.exit_share < _SHORTEST or blend.entry_share < _SHORTEST:
-            self.is_done = True
-            return
-        left = _by_blend(before.state(model, blend.exit_share), 2.0 * (1.0 - blend.exit_share))
-        right = _by_blend(after.state(model, blend.entry_share), 2.0 * blend.entry_share)
-        self._blend, self._section = blend, blend_section(blend, left, right, self._arm.solver)
-        self._sampling = Sampling(self._section, left[0].tolist(), self._arm.limits.joint)
+        return before, after
 
     def _radius(self, before: _Side, after: _Side) -> float:
         target = self._before.target

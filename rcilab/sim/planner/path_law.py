@@ -81,6 +81,17 @@ class PathLaw:
         self._stretches = list(stretches)
         self._plan()
 
+    def can_slow_down(self, s: float, ds: float) -> bool:
+        """Returns whether it can have a velocity, or a smaller one, at a path length, inside the present bounds."""
+        if not self._stretches:
+            return False
+        line = self._line
+        _, _, acceleration, jerk = self._stretches[0]
+        left = s - line.s - line.ds * CYCLE_TIME
+        if left <= 0.0:
+            return False
+        return line.ds <= ds or change_distance(line.ds, line.dds, ds, acceleration, jerk) <= left
+
     def set_override(self, part: float) -> None:
         """Multiplies every velocity bound from now on; above 0, up to 1."""
         if part != self._override:

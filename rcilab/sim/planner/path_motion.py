@@ -18,7 +18,7 @@ from rcilab.sim.planner.section import Section
 from rcilab.sim.planner.section_bounds import ShareBounds
 from rcilab.sim.planner.target import PauseTarget, Target
 
-_AHEAD = 16  # Targets that are prepared before their turn.
+_AHEAD = 16  # Targets that are known ahead, the running one among them.
 _DIFFERENCE = 1e-4  # Step of the share for derivatives by it.
 
 
@@ -221,7 +221,7 @@ class PathMotion:
             if event.kind is EventKind.REACHED:
                 self._chain.popleft()
         if law.is_at_end:
-            self._forget_path()
+            self._leave_path()
 
     def _work(self) -> None:
         """Computes one slice of what is ahead."""
@@ -241,7 +241,7 @@ class PathMotion:
             return
         preparation = self._preparation
         if preparation is None:
-            if not self._waiting or self._refused or len(self._ready) >= _AHEAD:
+            if not self._waiting or self._refused or len(self._ready) + len(self._chain) >= _AHEAD:
                 return
             preparation = self._preparation = Preparation(self._arm, self._waiting[0], self._next_start())
         preparation.advance()
@@ -298,15 +298,16 @@ class PathMotion:
         return can_join(self._chain[-1], self._ready[0])
 
     def _join(self, corner: Corner) -> None:
-        """Appends a corner and the section after it to the path, unless the corner begins too near."""
+        """Appends a corner and the section after it to the path, unless it is too late to slow down for it."""
         blend, last = corner.blend, self._pieces[-1]
-        if len(self._pieces) == 1 and last.share_at(self._law.s) >= blend.exit_share:
+        length = 2.0 * (1.0 - blend.exit_share) * last.scale
+        begin = last.begin + last.scale * (blend.exit_share - last.share)
+        if not self._law.can_slow_down(begin, length * corner.bounds[0].velocity):
             return
         prepared = self._ready.popleft()
         section = prepared.section
         assert section is not None
         last.last_share = blend.exit_share
-        length = 2.0 * (1.0 - blend.exit_share) * last.scale
         rounded = _Piece(corner.section, corner.bounds, last.end, 0.0, length)
         after = _Piece(section, prepared.bounds, rounded.end, blend.entry_share, length / (2.0 * blend.entry_share))
         self._pieces += (rounded, after)
@@ -322,10 +323,15 @@ class PathMotion:
         self._is_corner_tried = False
         self._law.set_stretches([s for piece in self._pieces for s in piece.stretches() if s.end > self._law.s])
 
-    def _forget_path(self) -> None:
+    def _leave_path(self) -> None:
         self._chain.clear()
         self._pieces.clear()
         self._marks.clear()
-        self._corner, self._preparation, self._refused = None, None, None
+        self._corner = None
         self._dwell = 0
         self._law.reset()
+
+    def _forget_path(self) -> None:
+        """Leaves the path before its end: what is prepared begins elsewhere."""
+        self._leave_path()
+        self._preparation = self._refused = None

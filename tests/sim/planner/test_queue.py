@@ -146,6 +146,27 @@ def test_a_target_added_during_the_motion_is_joined_to_it(model: RobotModel) -> 
     assert largest_shares(rows, model.limits.joint) < [1.0, 1.0, 1.0]
 
 
+@pytest.mark.parametrize("cycle", range(360, 600, 40))
+def test_a_target_that_comes_late_is_joined_only_if_the_arm_can_slow_down_for_the_corner(cycle: int) -> None:
+    model = load_model("xArm6")
+    start, speed = model.forward(model.home), ToolSpeed(velocity=0.6)
+    first = LineTarget(id=1, pose=shifted(start, 0.0, 0.2, 0.0), speed=speed, blend=Blend(radius=0.01))
+    second = LineTarget(id=2, pose=shifted(start, -0.02, 0.02, 0.0), speed=speed)
+    rows, events = drive(planner_with(model, first), {cycle: lambda planner: planner.add(second)})
+    assert [event.id for _, event in events if event.kind is REACHED] == [1, 2]
+    assert largest_shares(rows, model.limits.joint) < [1.0, 1.0, 1.0]
+
+
+def test_many_short_lines_are_one_motion(model: RobotModel) -> None:
+    start = model.forward(model.home)
+    poses = [shifted(start, -0.01 * (k % 2), 0.004 * k, 0.0) for k in range(1, 41)]
+    targets = [LineTarget(id=k, pose=pose, speed=SLOW, blend=Blend(share=1.0)) for k, pose in enumerate(poses)]
+    rows, events = drive(planner_with(model, *targets))
+    assert [event.id for _, event in events if event.kind is REACHED] == list(range(40))
+    assert largest_shares(rows, model.limits.joint) < [1.0, 1.0, 1.0]
+    assert speeds(model, rows)[200:-200].min() > 1e-3, "it does not stop"
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_random_targets_keep_the_limits_of_the_joints(model: RobotModel, seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -288,6 +309,22 @@ def test_a_target_where_the_arm_stands_is_reached_at_once(model: RobotModel) -> 
     here = model.forward(model.home)
     _, events = drive(planner_with(model, LineTarget(id=1, pose=here), JointTarget(id=2, q=tuple(model.home.tolist()))))
     assert [event[:2] for _, event in events] == [(1, BEGAN), (1, REACHED), (2, BEGAN), (2, REACHED)]
+
+
+def test_a_line_keeps_its_speed_where_the_arm_is_to_report_its_joints() -> None:
+    model = load_model("xArm6")
+    start = model.forward(model.home)
+    tight = replace(model.limits, joint=replace(model.limits.joint, velocity=np.full(model.n, 0.2)))
+    line = LineTarget(id=1, pose=shifted(start, 0.0, 0.2, 0.0), speed=SLOW)
+    found: list[float] = []
+    for slows_down in (True, False):
+        planner = Planner(model, tight, model.home.tolist(), slows_down=slows_down)
+        planner.add(line)
+        rows, _ = drive(planner)
+        found.append(speeds(model, rows).max())
+        assert (largest_shares(rows, tight.joint)[0] < 1.0) is slows_down
+    assert found[0] < 0.15
+    assert found[1] == pytest.approx(0.2, rel=1e-3)
 
 
 def test_progress_and_number_of_targets_are_known(model: RobotModel) -> None:
