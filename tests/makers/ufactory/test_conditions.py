@@ -16,6 +16,7 @@ from rcilab.makers.ufactory.conditions import UFACTORY_CONDITIONS as TABLE
 from rcilab.makers.ufactory.errors import UfactoryError, UfactoryWarning
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint, plan_line
+from tests.makers.ufactory.library import library_module, needs_library
 
 ARM = load_model("xArm6")
 AHEAD = ARM.home + [0.0, 0.9, -0.9, 0.0, 0.0, 0.0]
@@ -125,8 +126,9 @@ def test_errors_and_warnings_are_named_and_explained():
         assert fault.remedy.endswith(".")
 
 
+@needs_library
 def test_codes_are_those_of_the_client_library():
-    codes = pytest.importorskip("xarm.core.config.x_code")
+    codes = library_module("xarm.core.config.x_code")
     assert {error.value for error in UfactoryError} <= set(codes.ControllerErrorCodeMap)
     assert {warning.value for warning in UfactoryWarning} <= set(codes.ControllerWarnCodeMap)
 

@@ -13,6 +13,7 @@ from rcilab.model.kinematics.solvers.build import build_solver
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_line
 from rcilab.robots.shapes import build_shapes
+from tests.makers.ufactory.library import library_module, needs_library
 
 ZERO_POSES = {  # x, y, z [m] with all joints at zero, flange down: the client library's, the 850's by its table.
     "xArm5": (0.207, 0.0, 0.112),
@@ -74,9 +75,10 @@ def test_the_drives_hold_the_arm_with_its_payload_everywhere(name):
         assert (np.abs(model.torque(q, still, still).gravity) < limits.torque).all()
 
 
+@needs_library
 @robots
 def test_ranges_are_those_of_the_client_library(name):
-    table = pytest.importorskip("xarm.core.config.x_config").XCONF.Robot.JOINT_LIMITS
+    table = library_module("xarm.core.config.x_config").XCONF.Robot.JOINT_LIMITS
     axes, kind = {"xArm5": (5, 5), "xArm6": (6, 6), "xArm7": (7, 7), "Lite6": (6, 9), "850": (6, 12)}[name]
     limits = load_model(name).limits.joint
     np.testing.assert_array_equal(np.column_stack((limits.lower, limits.upper)), table[axes][kind])

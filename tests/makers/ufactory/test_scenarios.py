@@ -9,11 +9,10 @@ from rcilab.makers.ufactory.errors import UfactoryError
 from rcilab.makers.ufactory.robots import ROBOTS
 from rcilab.makers.ufactory.scenarios import scenarios_of
 from rcilab.model.robot_model import load_model
+from tests.makers.ufactory.library import needs_library
 
-pytest.importorskip("xarm", reason="the extra xarm is not installed")
 
-
-@pytest.mark.filterwarnings("ignore:The 'warn' method is deprecated")  # Of the client library, where a target fails.
+@needs_library
 def test_errors_come_with_their_reason_and_the_arm_moves_again():
     with FaultLab("xArm6") as lab:
         for fault in (UfactoryError.SAFETY_BOUNDARY, UfactoryError.SELF_COLLISION):
