@@ -19,7 +19,9 @@ _LARGEST_STEP = 0.1  # [rad] A larger one leaves the last angles.
 _MOST_DAMPED_STEPS = 40
 _FARTHEST = 0.6  # [rad] That a joint may be from the last angles after damped steps.
 _DAMPING = 0.1  # Of damped steps, times the square of the error in metres and radians; a tuning value.
+_LEAST_DAMPING = 1e-12  # For arms with fewer than six joints, whose J J^T has no inverse.
 _CONVERGED = 1e-20  # [m^2], [rad^2]
+_ROUNDED = 1e-10  # [m^2], [rad^2]
 _EYE = np.eye(6)
 _SMALLEST = 1e-8  # Determinant of J J^T, in metres and radians: about 1e-3 in a usual pose.
 
@@ -115,9 +117,12 @@ class IkTracker:
             square = float(residual @ residual)
             if square < _CONVERGED:
                 return q.tolist()
-            q = q + J.T @ np.linalg.solve(J @ J.T + _DAMPING * square * _EYE, residual)
+            step = J.T @ np.linalg.solve(J @ J.T + (_DAMPING * square + _LEAST_DAMPING) * _EYE, residual)
+            q = q + step
             if np.abs(q - near).max() > _FARTHEST:
                 return None
+            if square < _ROUNDED and len(q) < len(residual) and np.abs(step).max() < _CONVERGING:
+                return q.tolist()  # Fewer than six joints reach a pose of single precision up to its rounding.
         return None
 
     def _step_to(self, T_base_tool: Pose, held: int, psi: float, near: Sequence[float]) -> list[float] | None:

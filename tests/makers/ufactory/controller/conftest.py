@@ -71,9 +71,9 @@ class Arm:
         peer = self.client if client is None else client
         self._transaction += 1
         payload = struct.pack(code if code[:1] in "<>" else f"<{code}", *values)
-        number = struct.pack(">H", self._transaction)
+        number, before = struct.pack(">H", self._transaction), len(self.link.sent[peer])
         self.server.receive(peer, number + struct.pack(">HHB", PROTOCOL, 1 + len(payload), function) + payload)
-        (frame,) = (f for f in self.link.sent[peer] if f[:2] == number and f[6] != 0xFF)
+        (frame,) = (f for f in self.link.sent[peer][before:] if f[:2] == number and f[6] != 0xFF)
         assert frame[2:4] == struct.pack(">H", PROTOCOL)
         assert struct.unpack(">H", frame[4:6]) == (len(frame) - 6,)
         assert frame[6] == function
@@ -101,6 +101,17 @@ class Arm:
         self.call(Function.SET_MODE, "2B", mode, 0)
         assert self.call(Function.SET_STATE, "B", 0)[0] == 0
         self.step()
+
+    def ready_again(self) -> None:
+        """Sends what `ready` sends, whatever comes of it."""
+        for function, values in (
+            (Function.CLEAN_ERROR, ()),
+            (Function.MOTION_ENABLE, (ALL, 1)),
+            (Function.SET_MODE, (0, 0)),
+            (Function.SET_STATE, (0,)),
+        ):
+            self.call(function, f"{len(values)}B", *values)
+            self.step()
 
     def move_joints(self, q: Sequence[float], speed: float = JOINT_SPEED, radius: float | None = None) -> int:
         function = Function.MOVE_JOINT if radius is None else Function.MOVE_JOINT_BLENDED
