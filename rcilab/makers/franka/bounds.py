@@ -6,7 +6,7 @@ from typing import Final
 
 CLIENT_PORT: Final = 1337
 """TCP port that every client connects to."""
-SINGLE_PRECISION: Final = 3e-7  # [rad] or [m] Half a unit in the last place of a float below 4 is at most 2.4e-7.
+SINGLE_PRECISION: Final = 3e-7  # [rad] or [m] Half a unit in the last place of a float below 8 is at most 2.4e-7.
 """Rounding in the states of version 10."""
 LONGEST_TOOL: Final = 2.0  # [m] Distance of a frame, or of a centre of mass, from the flange; rcilab's own bound.
 LARGEST_JOINT_STIFFNESS: Final = 14250.0  # [N m/rad] Comments of libfranka's robot.h, as the two below.

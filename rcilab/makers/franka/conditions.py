@@ -5,9 +5,11 @@ consequences for the joints, and for torques. Its recommendations for the start 
 for Cartesian ones; they are applied to joints, too. The page "Errors" names the error of each violated condition.
 Differences are backward differences over 1 ms there as well.
 
-The FR3 has the Panda's rows with two differences. Its velocity bounds decrease towards the ends of the joints' ranges;
-they are those at the last commanded angles, which its clients compute from its state. And a commanded angle out of
-range raises the error of a measured one.
+The FR3 has the Panda's rows with three differences. Its velocity bounds decrease towards the ends of the joints'
+ranges; they are those at the last commanded angles, which its clients compute from its state. A commanded angle out of
+range raises the error of a measured one. And its state has single precision: a client whose rate limiter starts from
+the commanded values in it is off by their rounding, which the bounds of accelerations, jerks, torque rates and first
+commands allow.
 """
 
 from __future__ import annotations
@@ -47,7 +49,9 @@ from rcilab.core.condition import (
     joint_limits,
     symmetric_bounds,
 )
+from rcilab.core.limits import JointLimits
 from rcilab.makers.franka.errors import FrankaError
+from rcilab.makers.franka.state_rounding import joint_limits_with_state_rounding, with_state_rounding
 
 _PAGE = "Franka's page Robot and interface specifications"
 _ERRORS = "Franka's page Errors"
@@ -310,7 +314,21 @@ def _fr3_row(row: Condition) -> Condition:
     return replace(row, fault=fault, source=f"{source}; {numbers}")
 
 
-_FR3 = {row.id: _fr3_row(row) for row in FCI_CONDITIONS.conditions}
+def _with_rounding(row: Condition) -> Condition:
+    """Returns a row with bounds that allow the rounding of the last command in the state, if its value is off by it."""
+    is_first_or_torque = row.stage == "start" or row.signal == "torque"
+    is_rounded = row.id != "torque.range" if is_first_or_torque else row.order >= 2
+    if row.necessity != "necessary" or row.is_measured or not is_rounded:
+        return row
+
+    def bounds(limits: AnyLimits) -> Bounds:
+        is_joint = isinstance(limits, JointLimits)
+        return row.bounds(joint_limits_with_state_rounding(limits) if is_joint else with_state_rounding(limits))
+
+    return replace(row, bounds=bounds, source=f"{row.source} (with the rounding of the state: rcilab)")
+
+
+_FR3 = {row.id: _with_rounding(_fr3_row(row)) for row in FCI_CONDITIONS.conditions}
 
 
 def _fr3_rows(rows: tuple[Condition, ...]) -> tuple[Condition, ...]:

@@ -304,7 +304,7 @@ def elbow_too_strong(start: State) -> Wrong:
 
 
 def elbow_jerk(start: State) -> Wrong:
-    path, at = _jump(1.02 * H * _bounds(start).elbow[2])
+    path, at = _jump(1.03 * H * _bounds(start).elbow[2])
     return Wrong(_poses(start, 2, path), at)
 
 

@@ -38,6 +38,7 @@ from rcilab.makers.franka.controller.reporter import SINGULAR, StateReporter
 from rcilab.makers.franka.controller.settings import Settings, apply_request, apply_setup
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.limit_tables import DEFAULT_TABLE, cartesian_limits, require_table
+from rcilab.makers.franka.state_rounding import with_state_rounding
 from rcilab.makers.franka.wire.command_packet import CommandPacket
 from rcilab.makers.franka.wire.requests import Move, Numbers, Request, SetLoad, SetNEToEE
 from rcilab.makers.franka.wire.state_packet import NO_ERRORS, NO_READINGS, StatePacket, flags_of
@@ -299,6 +300,8 @@ class FciController:
         self._links.begin(self.arm.signals.measured.q)
         self.arm.prepare_motion(motion.mode)
         limits = cartesian_limits(self.model.limits, self.limit_table)
+        if self.version.has_floats:
+            limits = with_state_rounding(limits)
         unchecked = replace(limits.joint, torque=np.full(self.model.n, np.inf))  # The range of torques is no error.
         self.arm.begin_motion(
             replace(limits, joint=unchecked),
