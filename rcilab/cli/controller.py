@@ -103,7 +103,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--realism",
         metavar="KIND",
-        help="real: friction, noise and steps of the torque readings as measured on a real arm (off; mujoco only)",
+        help="real: friction, noise and steps of the torque readings as on a real arm (off; xMate and mujoco only)",
     )
     parser.add_argument(
         "--lockstep",

@@ -42,7 +42,8 @@ def show_entry(form: LogFormat, cycle: Callable[[], int]) -> Callable[[str, str]
     def show(kind: str, text: str) -> None:
         entry = LogEntry(kind=kind, text=text, cycle=cycle(), wall=time.time())
         with suppress(OSError):  # The files are written, also if the log is not read.
-            print(entry.written(form), file=sys.stderr, flush=True)
+            sys.stderr.write(f"{entry.written(form)}\n")  # At once: the controller's own lines may come in between.
+            sys.stderr.flush()
 
     return show
 

@@ -526,6 +526,11 @@ class ArmServer:
                 f"lock-step waits {self._lockstep_patience:g} s for a command; a longer --patience is for a client "
                 "that pauses for longer, as in a debugger"
             )
+        if self._server.patience > 0.0:  # A delay would make its clients unstable.
+            return (
+                f"a cycle waits {self._patience:g} s for its command, --patience S for longer; --lockstep waits for as "
+                "long as the client takes"
+            )
         return (
             "--prefill N absorbs pauses of the client of N ms, 100 at most; a client that pauses for longer needs "
             "SCHED_FIFO, or --lockstep"

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from pathlib import Path
 
 import pytest
 
 from rcilab.cli import main
-from rcilab.cli.motion_recorder import recorder_process
+from rcilab.cli.motion_recorder import recorder_process, show_entry
 from rcilab.core.cycle_ring import CycleRing
 from rcilab.recording.run import load_run
 from tests.peers import programs, wire
@@ -43,6 +44,14 @@ def test_the_arm_goes_on_without_the_recorder(tmp_path: Path) -> None:
             programs.prepare(robot, NEAR, factor=1.0)
             assert not any(state.errors for state in robot.states)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_line_of_the_recorder_is_written_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    written: list[str] = []
+    monkeypatch.setattr(sys.stderr, "write", written.append)
+    show_entry("text", lambda: 0)("not_recorded", "motions are not recorded any more")
+    (line,) = written
+    assert line.endswith("motions are not recorded any more\n")
 
 
 def test_modules_in_the_folder_of_the_user_do_not_replace_those_of_the_recorder(

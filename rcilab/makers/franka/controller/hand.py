@@ -1,7 +1,7 @@
 """The hand of a Franka arm: two fingers that open, close, and hold an object between them. No sockets, no clock.
 
 The figures are those of the data sheet of the Franka hand: 80 mm of stroke, 50 mm/s for each finger. An object is only
-its width; unless it is set from outside, an object of the expected width is there for every grasp.
+its width; unless it is set from outside, an object of the expected width is there for every grasp from a larger one.
 """
 
 from __future__ import annotations
@@ -78,7 +78,8 @@ class FrankaHand:
             return None
         goal = task.widths[0]
         if isinstance(task.request, Grasp):
-            goal = task.request.width if self.object_width is None else self.object_width
+            held = task.request.width if self.object_width is None else self.object_width
+            goal = held if held <= self.width else 0.0  # It is not between fingers that are closer: they only close.
         step = task.speed * CYCLE_TIME
         way = goal - self.width
         if abs(way) > step:

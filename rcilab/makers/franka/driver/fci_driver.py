@@ -21,7 +21,7 @@ from rcilab.makers.franka.driver.fault_report import describe_faults
 from rcilab.makers.franka.driver.handshake import find_version
 from rcilab.makers.franka.driver.libraries import arm_of, load_client_library, version_of
 from rcilab.makers.franka.driver.session_commands import FciSessionCommands
-from rcilab.makers.franka.driver.settings import FciSettings, find_reason
+from rcilab.makers.franka.driver.settings import FciSettings, find_reason, refusal_of
 from rcilab.makers.franka.driver.state_reader import StateReader
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.limit_tables import cartesian_limits
@@ -146,7 +146,7 @@ class FciDriver:
         if not self.is_powered():
             reason = find_reason(self._client)
             assert reason is not None  # Both modes have one.
-            raise CommandRejectedError("power_on", reason[0], reason[1], reason=reason[0])
+            raise refusal_of("power_on", reason)
 
     def is_powered(self, *, alongside: bool = False) -> bool:
         """Returns whether the joints are unlocked and no user stop is pressed, by the newest state."""
@@ -224,7 +224,7 @@ class FciDriver:
             reason = find_reason(self._client)
             if reason is None:
                 raise
-            raise CommandRejectedError("Move", refusal.status, reason[1], reason=reason[0]) from refusal.__cause__
+            raise refusal_of("Move", reason) from refusal.__cause__
         self._shown = mode, _GENERATORS[mode]
 
     def has_begun(self, state: RobotState) -> bool:

@@ -175,13 +175,18 @@ class FciSettings:
             reason = find_reason(self._client)
             if reason is None:
                 raise
-            word, sentence = reason
-            raise CommandRejectedError(name, refusal.status, sentence, reason=word) from refusal.__cause__
+            raise refusal_of(name, reason) from refusal.__cause__
 
 
 def find_reason(client: FciClient) -> tuple[str, str] | None:
     """Returns why a controller refuses requests at present: a key and a sentence; None if it does not."""
     return _REASONS.get(RobotMode(int(client.newest.robot_mode)))
+
+
+def refusal_of(command: str, reason: tuple[str, str]) -> CommandRejectedError:
+    """Returns the error of a request that a controller refuses at present: our reason replaces the library's text."""
+    word, sentence = reason
+    return CommandRejectedError(command, "not possible", sentence, reason=word)
 
 
 def as_load(mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> Payload:

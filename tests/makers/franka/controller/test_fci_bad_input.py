@@ -242,7 +242,7 @@ def test_another_program_of_the_clients_machine_commands_nothing(place: FciArena
         other.bind(("127.0.0.1", 0))
         other.sendto(robot.pack(start.message_id, Output(q=(1.0,) * 7)), robot._source)
         place.between(lambda: None)
-        ending = robot.play(start, programs.motion(start, wire.JOINT_POSITION), cycles=201)
+        ending = robot.play(robot.state(), programs.motion(start, wire.JOINT_POSITION), cycles=201)
     assert (ending.status, ending.state.errors) == ("success", ())
     assert len(place.log("unknown_sender")) == 1
 

@@ -54,6 +54,8 @@ def test_by_the_clock_a_client_that_falls_silent_loses_its_motion(version: int) 
         ended = robot.state_when(lambda state: state.robot_mode == wire.ROBOT_REFLEX)
         assert ended.errors == ("communication_constraints_violation",)
         assert robot.ending() == "reflex"
+        (advice,) = place.log("advice")
+        assert advice.startswith("a cycle waits 0.02 s for its command, --patience S for longer; --lockstep waits")
         assert robot.ask("automatic_error_recovery").status == "success"
         ending = by_time(robot, wire.JOINT_POSITION, 300)
         assert (ending.status, ending.state.errors) == ("success", ())

@@ -77,6 +77,13 @@ def test_a_grasp_holds_an_object_of_its_width_and_fails_without_one(hand: Hand, 
     assert hand.state().width == pytest.approx(0.0)
 
 
+def test_fingers_that_are_closer_than_the_object_close_without_it(hand: Hand) -> None:
+    assert hand.ask(wire.MOVE, 0.01, 0.2) == "success"
+    assert hand.ask(wire.GRASP, 0.03, 0.005, 0.005, 0.2, 40.0) == "unsuccessful"
+    state = hand.state()
+    assert (state.width, state.is_grasped) == (pytest.approx(0.0), False)
+
+
 def test_a_command_is_aborted_by_the_next_one(hand: Hand) -> None:
     first = hand.send(wire.MOVE, struct.pack("<2d", 0.0, 0.01))
     second = hand.send(wire.STOP)
