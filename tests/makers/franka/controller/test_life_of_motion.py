@@ -244,7 +244,7 @@ def test_the_success_rate_is_that_of_the_last_hundred_cycles_and_zero_at_rest(ro
         robot.answer(state, Output(q=start.q_d))
         state = robot.state()
     assert state.success_rate == 1.0
-    place.between(lambda: [place.controller.step() for _ in range(10)])
+    place.arena.between(lambda cycle: [cycle.step() for _ in range(10)])  # The next command, and 10 lost ones.
     for _ in range(5):
         robot.answer(state, Output(q=start.q_d))
         state = robot.state()
