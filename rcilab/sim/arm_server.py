@@ -42,7 +42,7 @@ from rcilab.sim.arrivals import (
     FrameArrived,
     UnknownSenderDetected,
 )
-from rcilab.sim.channels import Peer
+from rcilab.sim.channels import Peer, UdpChannel
 from rcilab.sim.clock_stalls import StallSchedule
 from rcilab.sim.controller_config import CONTROLLER_OPTIONS, ControllerConfig
 from rcilab.sim.cycle_capture import CycleCapture
@@ -107,6 +107,7 @@ class ArmServer:
         self.controller = server.controller
         self.bad_datagrams = 0
         self._server = server
+        self._has_datagrams = any(isinstance(channel, UdpChannel) for channel in server.channels)
         self._has_timed_out = False
         self._arrived = 0  # In lock-step: commands of the motion before the newest state was sent.
         self._lines: LogLines | None = None
@@ -427,7 +428,7 @@ class ArmServer:
         is_idle = self._is_idle
         self._catch_up()
         self._advance()
-        if is_idle:
+        if is_idle or not self._has_datagrams:  # Without datagrams, no client answers states: requests need not wait.
             self._serve_until(due)
         else:
             self._clock.sleep_until(due)
