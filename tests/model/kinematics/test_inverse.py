@@ -81,7 +81,7 @@ def test_a_singular_pose_gives_the_solution_nearest_to_where_the_arm_is(name):
         np.testing.assert_allclose(solution, q, atol=1e-7)
 
 
-@pytest.mark.parametrize("name", CLOSED_FORM)
+@pytest.mark.parametrize("name", sorted({*CLOSED_FORM} - {"GEN72"}))  # Its flange looks aside from a stretched arm.
 @pytest.mark.parametrize("short", [0.0, 1e-12, 1e-9, 1e-6, 1e-3])
 def test_almost_stretched_poses_are_finite_and_exact(name, short):
     model = load_model(name)
