@@ -42,7 +42,7 @@ from rcilab.robots import describe_robot
 _AXES = ("x", "y", "z")
 _FASTEST_TOOL = 1.0  # [m/s] The client library lowers a higher speed to it.
 _HEAVIEST_LOAD = 20.0  # [kg] rcilab's own bound, for kilograms given as grams.
-_QUIET = 5  # Reports without a motion until it has ended: the first one may be older than its command.
+_QUIET = 5  # Reports without a motion until it has ended: the first ones may be older than its command.
 _BOUNDARY = (-32768, 32767)  # [mm] Numbers of 16 bits.
 _ROUNDING = 1e-6  # [mm] Rounding of lengths that are whole millimetres.
 _SAME_ANGLE = 1e-6  # [rad]
@@ -324,6 +324,8 @@ class XArmSettings:
 
     def _await_end(self) -> None:
         quiet, link = 0, self._link
+        while earlier := link.poll(0.0):  # From before the motion.
+            link.on_states(earlier)
         self._is_moving, self._is_stopped = True, False
         try:
             while quiet < _QUIET:

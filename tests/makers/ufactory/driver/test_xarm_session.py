@@ -23,6 +23,9 @@ from rcilab.core.state import RobotMode
 from rcilab.execution.session import connect
 from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, SoftJointLimits
 from rcilab.makers.parameters import default_parameters
+from rcilab.makers.ufactory.driver.connection import Shown
+from rcilab.makers.ufactory.driver.settings import XArmSettings
+from rcilab.makers.ufactory.driver.state_reader import MOVING, READY
 from rcilab.makers.ufactory.errors import UfactoryError
 from rcilab.makers.ufactory.parameters import parameter_groups
 from rcilab.motion import plan_joint
@@ -142,6 +145,29 @@ def test_motions_are_planned_by_the_controller(robot):
     commands.set_user_frame(Pose())
     with pytest.raises(InvalidValueError, match=r"speed.*is outside 0 to 1 \[m/s\]"):
         commands.move_l(start, 100.0)
+
+
+def test_reports_from_before_a_motion_do_not_end_it():
+    ready, moving = Shown(READY, 0, 0), Shown(MOVING, 0, 1)
+
+    class Link:
+        client, n, shown = None, 7, ready
+        unread = [ready] * 10  # Of an arm at rest, before the command.
+        later = [moving] * 3 + [ready] * 5
+
+        def on_states(self, states):
+            pass
+
+        def poll(self, timeout):
+            found, self.unread = self.unread, []
+            if not found and timeout:
+                found = [self.later.pop(0)]
+            self.shown = found[-1] if found else self.shown
+            return found
+
+    link = Link()
+    XArmSettings(link, "xArm7").wait()  # type: ignore[arg-type]
+    assert not link.later
 
 
 def test_a_planned_motion_can_be_stopped_from_another_thread(robot):
