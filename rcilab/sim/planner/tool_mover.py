@@ -22,7 +22,7 @@ from rcilab.sim.planner.target import JointSpeed, ToolSpeed
 _STEP = 1e-4  # [s] Of finite differences of poses.
 _SAMPLE_LENGTH = 0.06  # [m] Between the poses at which a new plan is checked; a tuning value.
 _SAMPLE_ANGLE = 0.3  # [rad] The same for the orientation.
-_FEWEST, _MOST = 4, 8  # Of these poses.
+_FEWEST, _MOST = 2, 8  # Of these poses.
 _SMALL = 1e-9  # [m], [rad] A shorter distance has no direction.
 _SAMPLED = 0.9  # Part of the joints' limits that is used where a plan is known from a few samples.
 
