@@ -140,9 +140,9 @@ class CurveSection:
     """A path of the tool.
 
     Args:
-        path: Its poses.
+        poses: Its poses.
+        intervals: Number of intervals after which its samples show what the joints do.
         solver: For the joint angles.
-        start: Joint angles at the start, n plain floats, [rad].
     """
 
     def __init__(self, poses: PosePath, intervals: int, solver: PoseSolver) -> None:
