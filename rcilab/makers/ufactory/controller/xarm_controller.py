@@ -498,13 +498,15 @@ class XArmController:
         self._last_excess = excess
         if excess > before:
             text = f"the tool is {excess:.2g} mm outside the safety boundary"
-            self.fail(UfactoryError.SAFETY_BOUNDARY, Remark(text, "outside_boundary", value=excess))
+            self.fail(
+                UfactoryError.SAFETY_BOUNDARY, Remark(text, "outside_boundary", value=MILLIMETRE * excess, unit="m")
+            )
             return
         if self.mode is Mode.SERVO:
             speed = hypot(*self.arm.tool_c.twist[:3])
             if speed > TOOL_SPEED * _SPEED_MARGIN:
                 text = f"the tool would move with {speed:.3g} m/s, faster than {TOOL_SPEED:g} m/s"
-                remark = Remark(text, "servo_speed", value=speed, bound=TOOL_SPEED)
+                remark = Remark(text, "servo_speed", value=speed, bound=TOOL_SPEED, unit="m/s")
                 self.fail(UfactoryError.SERVO_LINEAR_SPEED, remark)
                 return
         if self.settings.self_collision:
@@ -521,7 +523,7 @@ class XArmController:
         if self._overload >= _OVERLOAD_CYCLES:
             joint = int(torque.argmax()) + 1
             text = f"joint {joint}: the drive was at its largest torque for {_OVERLOAD_CYCLES} ms"
-            self.fail(UfactoryError(10 + joint), Remark(text, "overload", joint=joint))
+            self.fail(UfactoryError(10 + joint), Remark(text, "overload", joint=joint, milliseconds=_OVERLOAD_CYCLES))
 
     def _pause(self) -> None:
         if self.mode is Mode.POSITION:
