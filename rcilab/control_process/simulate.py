@@ -7,10 +7,11 @@ import weakref
 import numpy as np
 
 from rcilab.control_process.launch import start_controller
+from rcilab.core.errors import ModelError
 from rcilab.execution.session import RobotSession, open_session
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
-from rcilab.makers.maker import require_simulator
+from rcilab.makers.maker import find_missing_feature, require_simulator
 from rcilab.model.robot_model import RobotModel, load_model, require_model
 from rcilab.sim.controller_config import ControllerConfig, require_plant
 from rcilab.sim.streamed_motion import require_loss_behaviour
@@ -47,7 +48,11 @@ def simulate(
         ModelError: The arm has no virtual controller.
         ConnectionLostError: The virtual controller did not start; the message contains its output.
     """
-    require_simulator(require_model(model))
+    if find_missing_feature(require_simulator(require_model(model)), "driving") is not None:
+        raise ModelError(
+            f"{model.name} has no driver in rcilab: run rcilab controller --model {model.name}, and a program with its "
+            "maker's client library"
+        ).coded("no_driver", model=model.name)
     require_plant(plant, realism)
     options = ["--realism", realism]
     if on_loss is not None:

@@ -6,6 +6,7 @@ from math import radians
 from typing import TYPE_CHECKING
 
 from rcilab.core.condition import ConditionTable
+from rcilab.core.errors import ModelError
 from rcilab.makers.maker import Capabilities, Timing
 from rcilab.makers.realman.bounds import ANGLE_STEP, LONGEST_TOOL
 from rcilab.makers.realman.conditions import REALMAN_CONDITIONS
@@ -47,12 +48,20 @@ class RealMan:
         return ()
 
     def parse_address(self, text: str) -> RobotAddress:
-        """Raises an error: rcilab has no driver for these controllers."""
-        raise NotImplementedError
+        """Raises an error.
+
+        Raises:
+            ModelError: Always: rcilab has no driver for these controllers.
+        """
+        raise _no_driver()
 
     def open_driver(self, address: str, timeout: float, expected: ExpectedArm | None) -> StreamingDriver:
-        """Raises an error: rcilab has no driver for these controllers."""
-        raise NotImplementedError
+        """Raises an error.
+
+        Raises:
+            ModelError: Always: rcilab has no driver for these controllers.
+        """
+        raise _no_driver()
 
     def state_rounding(self, model: RobotModel) -> float:
         """Returns the resolution of joint angles on the wire, [rad]."""
@@ -67,6 +76,14 @@ class RealMan:
     def faults(self) -> type[RealManError]:
         """Returns the errors of the controllers and of their joints."""
         return RealManError
+
+
+def _no_driver() -> ModelError:
+    sentence = (
+        "RealMan's arms have no driver in rcilab: run rcilab controller and use the maker's client library, or plan, "
+        "check and draw"
+    )
+    return ModelError(sentence).coded("no_driver", model="RealMan")
 
 
 MAKER = RealMan()

@@ -7,7 +7,9 @@ import math
 import numpy as np
 import pytest
 
+import rcilab
 from rcilab.core.arrays import Array
+from rcilab.core.errors import ModelError
 from rcilab.makers.realman.robots import ROBOTS
 from rcilab.model.kinematics.solvers.build import build_solver
 from rcilab.model.robot_model import load_model
@@ -105,3 +107,8 @@ def test_geometry_and_limits_are_those_of_the_makers_library(name: str):
         np.testing.assert_allclose(pose.position, (x, y, z), atol=1e-6)
         # The library computes in single precision: near ry = 90 degrees its angles have 1e-6 and more of rounding.
         np.testing.assert_allclose(pose.rotation, rotation(rx, ry, rz), atol=5e-6)
+
+
+def test_a_session_says_that_there_is_no_driver_and_what_to_use():
+    with pytest.raises(ModelError, match="no driver in rcilab: run rcilab controller --model RM65"):
+        rcilab.simulate(load_model("RM65"))
