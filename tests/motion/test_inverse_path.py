@@ -11,10 +11,9 @@ from rcilab.core.errors import SingularError, UnreachableError
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.motion.inverse_path import inverse_path
-from rcilab.robots import ROBOT_NAMES
-from tests.arms import ANY_POSE
+from tests.arms import ANY_POSE, STREAMED
 
-ALL = pytest.mark.parametrize("name", ROBOT_NAMES)
+ALL = pytest.mark.parametrize("name", STREAMED)
 TOOL = Pose.from_rpy((0.02, -0.01, 0.1), (0.1, 0.2, 0.3))
 SEVEN = load_model("xMatePro7")
 

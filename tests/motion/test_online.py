@@ -13,9 +13,9 @@ from rcilab.motion import Jog, Motion, plan_joint, plan_stop
 from rcilab.motion.end_velocity import braking_limits
 from rcilab.motion.online import POSITION_MARGIN
 from rcilab.motion.twist import DAMPED_BELOW, damped_inverse
-from rcilab.robots import ROBOT_NAMES
+from tests.arms import STREAMED
 
-MODELS = {name: load_model(name) for name in ROBOT_NAMES}
+MODELS = {name: load_model(name) for name in STREAMED}
 MODEL = MODELS["xMatePro7"]
 LIMITS = MODEL.limits.joint
 LONG = 20_000  # Cycles that every motion to rest is shorter than.
