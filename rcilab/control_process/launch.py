@@ -111,7 +111,7 @@ def _find_free_address(port: int) -> str:
         with socket.socket() as probe:
             try:
                 probe.bind((host, port))
-            except PermissionError:  # This user may not open it: the controller finds another way, or says so.
+            except PermissionError:  # This user may not open it: the controller uses another socket, or reports it.
                 pass
             except OSError:  # Taken.
                 continue

@@ -198,9 +198,9 @@ class Stepper:
 
 
 class PathStepper:
-    """Advances a path length time-optimally to a place with a given velocity there, one cycle per call.
+    """Advances a path length time-optimally to a position with a given velocity there, one cycle per call.
 
-    Owned by the thread that runs the cycle. Past the place it continues with that velocity.
+    Owned by the thread that runs the cycle. Past that position it continues with that velocity.
 
     Attributes:
         s: Current path length, in the unit of the path.
@@ -224,12 +224,12 @@ class PathStepper:
         self._problem = problem
 
     def aim_at(self, s: float, ds: float, velocity: float, acceleration: float, jerk: float) -> None:
-        """Moves to a place from the next step on.
+        """Moves to a position from the next step on.
 
         Args:
-            s: The place, in the unit of the path.
+            s: The position, in the unit of the path.
             ds: Velocity there, 0 to `velocity`.
-            velocity: Bound on the way, above zero.
+            velocity: Bound along the path, above zero.
             acceleration: Bound, above zero.
             jerk: Bound, above zero.
         """

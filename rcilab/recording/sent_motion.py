@@ -130,11 +130,11 @@ def check_sent(
     report = _check(run, model, box, distance, mode)
     if not (run.has_playout and run.faults and report.ok):
         return report
-    beside = _check_beside_torques(run, model, box, distance)
-    return explain_stop(report, run, model) if beside is None or beside.ok else beside
+    parallel = _check_parallel_motion(run, model, box, distance)
+    return explain_stop(report, run, model) if parallel is None or parallel.ok else parallel
 
 
-def _check_beside_torques(
+def _check_parallel_motion(
     run: Run, model: RobotModel, box: SafetyBox | None, distance: ClearanceLimit | None
 ) -> Report | None:
     """Returns the check of the motion that a client commanded along with torques; None without one."""

@@ -293,7 +293,7 @@ class CycleCapture:
         return None
 
     def _find_answers(self, mode: MotionMode) -> tuple[_Answer, ...]:
-        """Returns how a command of this mode is stored: its torques, and the motion beside them."""
+        """Returns how a command of this mode is stored: its torques, and the parallel motion."""
         kinds = [CommandKind.TORQUES] if mode.law is ControlLaw.TORQUE else []
         if mode.kind not in kinds:
             kinds.append(mode.kind)

@@ -91,7 +91,7 @@ def test_a_number_counts_in_the_unit_typed_behind_it(typed, unit, value):
 def test_a_number_out_of_range_is_answered_in_the_units_of_the_page():
     problem = parse_number("9 rad", -170.0, 170.0, "deg").problem
     assert problem is not None
-    assert Text("en", SI).render(problem) == "9 rad is outside -2.97 rad to 2.97 rad."
+    assert Text("en", SI).render(problem) == "9 rad is outside -2.97 rad to 2.97 rad and is not used."
 
 
 def test_what_is_typed_without_a_unit_counts_in_that_of_the_page():

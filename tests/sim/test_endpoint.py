@@ -163,7 +163,7 @@ def test_without_privileges_clients_connect_by_unix_sockets(denied: None, tmp_pa
     assert not list(tmp_path.iterdir())
 
 
-def test_a_second_controller_without_privileges_is_told_its_ways(denied: None, tmp_path: Path) -> None:
+def test_a_second_controller_without_privileges_names_the_alternatives(denied: None, tmp_path: Path) -> None:
     first = Endpoint("127.0.0.3", channels(tmp_path))
     with pytest.raises(UsageError, match=r"502 needs privileges, and .*arm.* is in use; stop .*, start as root, or"):
         Endpoint("127.0.0.3", channels(tmp_path))
@@ -187,7 +187,7 @@ def test_with_a_free_port_no_unix_socket_is_opened(tmp_path: Path) -> None:
     endpoint.close()
 
 
-def test_a_port_that_needs_privileges_has_two_ways_on(denied: None) -> None:
+def test_a_port_that_needs_privileges_names_two_alternatives(denied: None) -> None:
     with pytest.raises(UsageError, match="above 1023 with --port N, start as root, or allow the port"):
         Endpoint("127.0.0.3", [TcpChannel(protocol="arm", port=502)])
 

@@ -388,7 +388,7 @@ def test_a_plan_names_the_rejected_number_that_it_would_not_have(square):
     square.actions.plan(PlanProgram())
     assert square.state.busy is None
     said = Text("en").render(square.state.notice.text)
-    assert said.startswith("Not planned: waypoint 1, Speed [%]: 500 is outside 0.1 to 100 %.")
+    assert said.startswith("Not planned: waypoint 1, Speed [%]: 500 is outside 0.1 to 100 % and is not used.")
     square.type("speed", "50")
     square.type("rounds", "0")
     square.actions.plan(PlanProgram())

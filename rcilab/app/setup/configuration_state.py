@@ -155,7 +155,7 @@ def describe_part(setup: RobotConfiguration, part: str) -> Message:
 
 
 def describe_held(status: SupervisorStatus, part: str) -> Message:
-    """Returns the controller's values: tool and load as it reports them, the rest as it acknowledged them."""
+    """Returns the controller's values: tool and load as it reports them, all others as it acknowledged them."""
     if part == "tool" and status.T_flange_tool is not None:
         return _describe_pose(status.T_flange_tool)
     if part == "load" and status.load is not None:

@@ -73,7 +73,7 @@ class RealManError(FaultCode):
 
     @property
     def cause(self) -> str:
-        """What the controller detected, in a few words."""
+        """What the controller detected, as a short text."""
         return _CAUSES[self]
 
     @property

@@ -1,9 +1,9 @@
 """The errors and warnings of UFACTORY controllers, each with the number that the maker's client library reports.
 
 Names, causes and remedies: chapter 12 of the user manual, and the table of codes of the client library. An error stops
-the arm and empties the queue; it is cleared by `clean_error`, after which the motors are enabled again. A warning only
-says that a request was not executed. Numbers that the virtual controller cannot raise, such as those of its boards, are
-left out.
+the arm and empties the queue; it is cleared by `clean_error`, after which the motors are enabled again. A warning
+only reports that a request was not executed. Numbers that the virtual controller cannot raise, such as those of its
+boards, are left out.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class UfactoryError(FaultCode):
 
     @property
     def cause(self) -> str:
-        """What the controller detected, in a few words."""
+        """What the controller detected, as a short text."""
         return _CAUSES[self]
 
     @property
@@ -82,7 +82,7 @@ class UfactoryWarning(FaultCode):
 
     @property
     def cause(self) -> str:
-        """Why a request was not executed, in a few words."""
+        """Why a request was not executed, as a short text."""
         return _WARNINGS[self][0]
 
     @property
@@ -123,7 +123,7 @@ _REMEDIES = {
     UfactoryError.SPEED: "Lower speed and acceleration; near a singular pose joints are much faster than the tool.",
     UfactoryError.PLANNING: "Plan the path again, or lower its speed.",
     UfactoryError.MEASURED_SPEED: "Clear the error; check that nothing pushes the arm.",
-    UfactoryError.COLLISION: "Clear the way and the error; check the load that is set, and the collision sensitivity.",
+    UfactoryError.COLLISION: "Remove the obstacle, clear the error; check load and collision sensitivity.",
     UfactoryError.SAFETY_BOUNDARY: "Clear the error and guide the arm back by hand in mode 2, or set a wider boundary.",
     UfactoryError.MANUAL_MODE: "Check that load and mounting direction are those of the arm, then clear the error.",
     UfactoryError.NO_SOLUTION: "Choose another target.",

@@ -48,7 +48,7 @@ class Guide:
     def at(self, share: float) -> list[float]:
         """Returns the joint angles at a share, n plain floats, [rad]."""
         n = len(self._table)
-        place = share * n
-        piece = min(max(int(place), 0), n - 1)
-        u = place - piece
+        position = share * n
+        piece = min(max(int(position), 0), n - 1)
+        u = position - piece
         return [a + u * (b + u * (c + u * (d + u * (e + u * f)))) for a, b, c, d, e, f in self._table[piece]]

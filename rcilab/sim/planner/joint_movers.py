@@ -84,7 +84,7 @@ class JointMover:
     def set_goal(self, q: Sequence[float], speed: JointSpeed) -> None:
         """Moves to these joint angles from the next step on, n finite numbers, [rad].
 
-        Where a joint would leave its range on the way, all stop first.
+        Where a joint would leave its range along the path, all stop first.
         """
         state = self.state
         self._goal, self._speed = list(q), speed
@@ -185,7 +185,7 @@ class StreamMover:
     def _takes(self, q: Sequence[float]) -> bool:
         """Advances to these angles if that is inside the bounds by differences; returns whether it is.
 
-        Otherwise the joints would brake for every place on the way.
+        Otherwise the joints would brake for every target along the path.
         """
         h = CYCLE_TIME
         dq: list[float] = []

@@ -33,6 +33,6 @@ class Mover(Protocol):
         """Advances one cycle and returns the joint angles, n plain floats, [rad].
 
         Raises:
-            KinematicsError: A pose on the way is out of reach or singular; the arm has not moved.
+            KinematicsError: A pose along the path is out of reach or singular; the arm has not moved.
         """
         ...

@@ -11,7 +11,7 @@ import numpy as np
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.sim.planner.corner import Corner, CornerPreparation, can_join, has_blend
 from rcilab.sim.planner.mover import MotionState
-from rcilab.sim.planner.path_law import PathLaw, Stretch
+from rcilab.sim.planner.path_time_law import PathTimeLaw, Stretch
 from rcilab.sim.planner.planner_event import EventKind, PlannerEvent, Refusal
 from rcilab.sim.planner.preparation import PlannedArm, Preparation, PreparedTarget
 from rcilab.sim.planner.section import Section
@@ -58,7 +58,7 @@ class _Piece:
 class PathMotion:
     """Moves through a queue of targets. Owned by a planner.
 
-    Sections that a corner joins are one chain, along which one law moves; otherwise the arm stops between two targets.
+    Sections that a corner joins are one chain, followed by one time law; otherwise the arm stops between two targets.
 
     Args:
         arm: The arm.
@@ -68,7 +68,7 @@ class PathMotion:
     def __init__(self, arm: PlannedArm, q: Sequence[float]) -> None:
         self._arm = arm
         self._q = list(q)
-        self._law = PathLaw()
+        self._time_law = PathTimeLaw()
         self._waiting: deque[Target] = deque()
         self._preparation: Preparation | None = None
         self._ready: deque[PreparedTarget] = deque()
@@ -85,7 +85,7 @@ class PathMotion:
     @property
     def is_stationary(self) -> bool:
         """Whether the arm stands: at a target, during a pause, or without one."""
-        return self._law.is_stationary
+        return self._time_law.is_stationary
 
     @property
     def is_idle(self) -> bool:
@@ -112,20 +112,20 @@ class PathMotion:
         """Share of the path of the current target, 0 to 1; 1 without one."""
         for piece in self._pieces:
             if self._chain and piece.section is self._chain[0].section:
-                return piece.share_at(self._law.s)
+                return piece.share_at(self._time_law.s)
         return 1.0
 
     @property
     def state(self) -> MotionState:
         """Where the joints are and how they move."""
-        law, q = self._law, self._q
-        if law.is_stationary or not self._pieces:
+        time_law, q = self._time_law, self._q
+        if time_law.is_stationary or not self._pieces:
             return MotionState(list(q), [0.0] * len(q), [0.0] * len(q))
         piece = self._pieces[0]
-        share = min(max(piece.share_at(law.s), _DIFFERENCE), 1.0 - _DIFFERENCE)
+        share = min(max(piece.share_at(time_law.s), _DIFFERENCE), 1.0 - _DIFFERENCE)
         before, here, after = (np.array(piece.section.at(share + side * _DIFFERENCE, q).q) for side in (-1.0, 0.0, 1.0))
         first, second = (after - before) / (2.0 * _DIFFERENCE), (after - 2.0 * here + before) / _DIFFERENCE**2
-        rate, change = law.ds / piece.scale, law.dds / piece.scale
+        rate, change = time_law.ds / piece.scale, time_law.dds / piece.scale
         return MotionState(list(q), (rate * first).tolist(), (rate * rate * second + change * first).tolist())
 
     def begin_at(self, q: Sequence[float]) -> None:
@@ -138,23 +138,23 @@ class PathMotion:
 
     def set_override(self, part: float) -> None:
         """Multiplies the velocities of all targets; above 0, up to 1."""
-        self._law.set_override(part)
+        self._time_law.set_override(part)
 
     def pause(self) -> None:
         """Stops on the path, inside the bounds of the target."""
         self._is_paused = True
-        self._law.pause()
+        self._time_law.pause()
 
     def resume(self) -> None:
         """Continues on the path."""
         self._is_paused = False
         if not self._is_ending:
-            self._law.resume()
+            self._time_law.resume()
 
     def end(self) -> None:
         """Stops on the path, then discards all targets."""
         self._is_ending = True
-        self._law.pause()
+        self._time_law.pause()
 
     def clear_queue(self) -> tuple[PlannerEvent, ...]:
         """Discards the targets to which the path does not lead yet, and returns their events."""
@@ -197,30 +197,30 @@ class PathMotion:
         if not (self._pieces or self._dwell or self._is_paused or self._is_ending):
             self._begin(events)
         if self._pieces:
-            if self._law.s > 0.0 or not (self._corner or self._can_join()):  # It begins with its first corner known.
+            if self._time_law.s > 0.0 or not (self._corner or self._can_join()):  # It begins with a known corner.
                 self._advance(events)
         elif self._dwell and not self._is_paused:
             self._dwell -= 1
             if not self._dwell:
                 events.append(PlannerEvent(self._chain.popleft().target.id, EventKind.REACHED))
-        if self._is_ending and self._law.is_stationary:
+        if self._is_ending and self._time_law.is_stationary:
             events += self.discard()
         return self._q, events
 
     def _advance(self, events: list[PlannerEvent]) -> None:
-        law = self._law
-        s = law.step()
+        time_law = self._time_law
+        s = time_law.step()
         pieces = self._pieces
         while len(pieces) > 1 and s >= pieces[0].end:
             pieces.popleft()
         piece = pieces[0]
         self._q = piece.section.at(piece.share_at(s), self._q).q
-        while self._marks and (s >= self._marks[0][0] or law.is_at_end):
+        while self._marks and (s >= self._marks[0][0] or time_law.is_at_end):
             event = self._marks.popleft()[1]
             events.append(event)
             if event.kind is EventKind.REACHED:
                 self._chain.popleft()
-        if law.is_at_end:
+        if time_law.is_at_end:
             self._leave_path()
 
     def _work(self) -> None:
@@ -289,8 +289,8 @@ class PathMotion:
         self._pieces.append(_Piece(prepared.section, prepared.bounds, 0.0, 0.0, prepared.length))
         self._marks.append((0.0, began))
         self._marks.append((prepared.length, PlannerEvent(target.id, EventKind.REACHED)))
-        self._law.reset()
-        self._law.set_stretches(self._pieces[-1].stretches())
+        self._time_law.reset()
+        self._time_law.set_stretches(self._pieces[-1].stretches())
 
     def _can_join(self) -> bool:
         if self._is_corner_tried or not (self._pieces and self._chain and self._ready):
@@ -302,7 +302,7 @@ class PathMotion:
         blend, last = corner.blend, self._pieces[-1]
         length = 2.0 * (1.0 - blend.exit_share) * last.scale
         begin = last.begin + last.scale * (blend.exit_share - last.share)
-        if not self._law.can_slow_down(begin, length * corner.bounds[0].velocity):
+        if not self._time_law.can_slow_down(begin, length * corner.bounds[0].velocity):
             return
         prepared = self._ready.popleft()
         section = prepared.section
@@ -321,7 +321,8 @@ class PathMotion:
         )
         self._chain.append(prepared)
         self._is_corner_tried = False
-        self._law.set_stretches([s for piece in self._pieces for s in piece.stretches() if s.end > self._law.s])
+        stretches = (s for piece in self._pieces for s in piece.stretches())
+        self._time_law.set_stretches([s for s in stretches if s.end > self._time_law.s])
 
     def _leave_path(self) -> None:
         self._chain.clear()
@@ -329,7 +330,7 @@ class PathMotion:
         self._marks.clear()
         self._corner = None
         self._dwell = 0
-        self._law.reset()
+        self._time_law.reset()
 
     def _forget_path(self) -> None:
         """Leaves the path before its end: what is prepared begins elsewhere."""

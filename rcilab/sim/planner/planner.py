@@ -55,7 +55,7 @@ class Planner:
     continues smoothly into the new motion. Only queued targets begin at standstill: they wait for it.
 
     * Queued targets (`add`), one after the other along exact paths, with `pause`, `resume`, `end`, `clear_queue`,
-      `skip` and an override. Events say which began, ended or were refused.
+      `skip` and an override. Events report which began, ended or were refused.
     * On-line commands: `move_joints`, `move_tool`, `set_joint_velocity`, `set_twist`. The newest one counts.
     * Servo: `servo_joints`, `servo_tool`, `follow_joints`, `follow_tool`: the newest target, nothing planned ahead.
 
@@ -143,7 +143,7 @@ class Planner:
         """Appends a target to the queue.
 
         Its path and the angles of the joints along it are computed in the next cycles, ahead of its turn. If it cannot
-        be followed, the event REFUSED says so when its turn comes, and those behind it are discarded.
+        be followed, the event REFUSED reports it when its turn comes, and those behind it are discarded.
 
         Raises:
             InvalidValueError: A value of it is not valid.
@@ -430,7 +430,7 @@ class Planner:
     def _running_state(self) -> MotionState:
         try:
             return self._queue.state if self._mover is None else self._mover.state
-        except KinematicsError:  # Beside a pose that cannot be reached.
+        except KinematicsError:  # Near a pose that cannot be reached.
             q, q1, q2 = (np.array(row) for row in self._past)
             dq, ddq = derivatives_from_differences((q - q1) / CYCLE_TIME, (q - 2.0 * q1 + q2) / CYCLE_TIME**2)
             return MotionState(q.tolist(), dq.tolist(), ddq.tolist())

@@ -1,4 +1,4 @@
-"""The way of planned joint angles into a virtual arm, as the commands of a motion that begins and ends by itself."""
+"""Planned joint angles of a virtual arm, as the commands of a motion that begins and ends by itself."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class FedStep(NamedTuple):
 
 
 class PlannerFeed:
-    """Moves a virtual arm by a planner. Owned by the controller's loop, which calls `step` in place of the arm's.
+    """Moves a virtual arm by a planner. Owned by the controller's loop, which calls `step` instead of the arm's.
 
     The arm must have a prefill of 0 and, with power on, the resting law POSITION. While nothing is to move, it only
     steps the arm.

@@ -11,7 +11,7 @@ from rcilab.core.clock import CYCLE_TIME
 StreamMode: TypeAlias = Literal["direct", "fit", "filter"]
 """How streamed angles are followed: as they come; on a curve through them, one period later; or low-pass filtered."""
 
-_LONGEST_TIME = 0.1  # [s] Time constant of the filter, and length of the mean over the curve, at smoothing 1; a choice.
+_LONGEST_TIME = 0.1  # [s] Time constant of the filter, and length of the mean over the curve, at smoothing 1; tuned.
 _LONGEST_PERIOD = 100  # [cycles] A client that streams more slowly is not streaming.
 
 

@@ -133,7 +133,7 @@ class ToolMover:
 
 
 class _PosePlan:
-    """Position and rotation vector from a goal, in axes along the way to it, as functions of time.
+    """Position and rotation vector from a goal, in axes along the path to it, as functions of time.
 
     Args:
         around: Poses a step before, at, and a step after the start.

@@ -30,7 +30,7 @@ def change_distance(v: float, a: float, w: float, a_max: float, j_max: float) ->
 
 
 def fastest_before(w: float, distance: float, a_max: float, j_max: float) -> float:
-    """Returns the largest constant velocity from which w is reached within a distance; also the other way round."""
+    """Returns the largest constant velocity from which w is reached within a distance; also in the other direction."""
     # Up to a change of a_max^2 / j_max the acceleration does not reach its bound: (2 w + c) sqrt(c / j) = distance.
     largest = a_max * a_max / j_max
     if (2.0 * w + largest) * a_max / j_max >= distance:

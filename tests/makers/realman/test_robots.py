@@ -109,6 +109,6 @@ def test_geometry_and_limits_are_those_of_the_makers_library(name: str):
         np.testing.assert_allclose(pose.rotation, rotation(rx, ry, rz), atol=5e-6)
 
 
-def test_a_session_says_that_there_is_no_driver_and_what_to_use():
+def test_a_session_reports_that_there_is_no_driver_and_what_to_use():
     with pytest.raises(ModelError, match="no driver in rcilab: run rcilab controller --model RM65"):
         rcilab.simulate(load_model("RM65"))

@@ -1,4 +1,4 @@
-"""UFACTORY's table: bounds of the manual, codes of the client library, and `check` that judges by them."""
+"""UFACTORY's table: bounds of the manual, codes of the client library, and `check` that applies them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def spoiled(order, size):
     return Motion.from_cycles(AHEAD + np.outer(rate, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
 
 
-def test_every_arm_is_judged_by_the_table_and_ids_are_unique():
+def test_every_arm_is_checked_by_the_table_and_ids_are_unique():
     for name in ("xArm6", "xArm7", "Lite6", "850"):
         model = load_model(name)
         assert condition_table(model.description) is TABLE
@@ -141,7 +141,7 @@ def test_the_documented_codes_are_all_of_them_with_their_causes_and_remedies():
         assert (row if is_drive else f"| {fault.manual_name} | {fault.cause} | {fault.remedy} |") in text
 
 
-def test_the_report_on_a_motion_says_how_often_its_angles_are_sent():
+def test_the_report_on_a_motion_has_how_often_its_angles_are_sent():
     model = load_model("xArm6")
     report = check(plan_joint(model, model.home, model.home + 0.1, speed=0.2), model)
     assert str(report.title).endswith("of which the angles of every 5 ms are sent")

@@ -40,8 +40,8 @@ def described(a, d, alpha, lower, upper) -> RobotDescription:
 
 
 SEVEN = RobotModel(
-    described(  # As an xArm 7: offsets before and behind the elbow that differ, and one at the wrist.
-        a=(0.0, 0.0, 0.0525, 0.0775, 0.0, 0.076, 0.0),
+    described(  # As an xArm 7, with an offset at joint 5: no closed form applies.
+        a=(0.0, 0.0, 0.0525, 0.0775, 0.01, 0.076, 0.0),
         d=(0.267, 0.0, 0.293, 0.0, 0.3425, 0.0, 0.097),
         alpha=(-QUARTER, QUARTER, QUARTER, QUARTER, QUARTER, -QUARTER, 0.0),
         lower=(-360.0, -118.0, -360.0, -11.0, -360.0, -97.0, -360.0),
@@ -49,8 +49,8 @@ SEVEN = RobotModel(
     )
 )
 SIX = RobotModel(
-    described(  # As an xArm 6: no spherical wrist.
-        a=(0.0, 0.2895, 0.0775, 0.0, 0.076, 0.0),
+    described(  # As an xArm 6, with an offset at joint 4: no closed form applies.
+        a=(0.0, 0.2895, 0.0775, 0.01, 0.076, 0.0),
         d=(0.267, 0.0, 0.0, 0.3425, 0.0, 0.097),
         alpha=(-QUARTER, 0.0, -QUARTER, QUARTER, -QUARTER, 0.0),
         lower=(-360.0, -200.0, -200.0, -360.0, -97.0, -360.0),

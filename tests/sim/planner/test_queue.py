@@ -105,7 +105,7 @@ def test_a_spline_passes_its_poses_smoothly(model: RobotModel) -> None:
     rows, _ = drive(planner_with(model, SplineTarget(id=1, poses=poses, speed=SLOW)))
     points = model.position_path(rows)
     for pose in poses:
-        assert np.linalg.norm(points - pose.position, axis=1).min() < 2e-4  # Half of a cycle's way.
+        assert np.linalg.norm(points - pose.position, axis=1).min() < 2e-4  # Half of a cycle's distance.
     assert largest_shares(rows, model.limits.joint) < [1.0, 1.0, 1.0]
     middle = speeds(model, rows)[400:-400]
     assert middle.min() > 0.1, "it does not stop at the poses"

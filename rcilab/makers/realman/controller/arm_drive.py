@@ -48,7 +48,7 @@ class ArmDrive:
         self._limits = limits
         self._number = 0
         self._is_stopping = False  # After a fault, until the arm stands.
-        self._rest = 0  # Cycles since something has moved.
+        self._idle_cycles = 0  # Cycles since something has moved.
         self._only_shown: list[float] | None = None  # Joint angles of a simulated arm.
         self.planner = Planner(arm.model, limits, arm.commanded.q)
         self.events: tuple[PlannerEvent, ...] = ()
@@ -98,7 +98,7 @@ class ArmDrive:
             self._restart()
 
     def _restart(self) -> None:
-        """Lets the planner begin anew where the arm is; a joint outside its range may move inwards."""
+        """Lets the planner begin again where the arm is; a joint outside its range may move inwards."""
         q = self.q_c
         limits = replace(self._limits, joint=range_from(self._limits.joint, np.array(q)))
         self.planner.configure(self.arm.model, limits)
@@ -130,14 +130,14 @@ class ArmDrive:
         if result.command_violations or result.measured_violations:
             self.abort()
             self.events += planner.take_events()
-        self._rest = 0 if not self.is_still else self._rest + 1
-        if self._rest > _LINGER:
+        self._idle_cycles = 0 if not self.is_still else self._idle_cycles + 1
+        if self._idle_cycles > _LINGER:
             arm.discard_motion()
         return result
 
     def _begin(self) -> None:
         arm = self.arm
-        self._rest = 0
+        self._idle_cycles = 0
         arm.prepare_motion(_MODE)
         joint = self._limits.joint
         acceleration = readonly_copy(_ALLOWANCE * joint.acceleration)

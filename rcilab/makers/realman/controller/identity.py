@@ -1,4 +1,4 @@
-"""What a controller says about itself when a client connects: versions, model, geometry."""
+"""What a controller reports about itself when a client connects: versions, model, geometry."""
 
 from __future__ import annotations
 

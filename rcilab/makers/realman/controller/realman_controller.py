@@ -111,7 +111,7 @@ class RealManController:
         self.on_end: Callable[[Trajectory, bool, bool], None] = lambda trajectory, reached, continues: None
         self.on_log: Callable[[str, str], None] = lambda kind, text: None
         arm.on_loss = "bridge"
-        self._rest()
+        self._hold()
         self.state = self._report()
 
     @property
@@ -198,7 +198,7 @@ class RealManController:
             if button != "none":
                 self.reason = _ESTOP
                 self.stop_at_once()
-            self._rest()
+            self._hold()
 
     def set_up(self, setup: ArmSetup) -> None:
         """Sets the arm up: joint angles, tool and load.
@@ -285,7 +285,7 @@ class RealManController:
         elif self.enabled[joint - 1] and self.is_moving:
             self._fail(RealManError.JOINT_DISABLED, Remark(f"joint {joint} was disabled during a motion"))
         self.enabled[joint - 1] = on
-        self._rest()
+        self._hold()
 
     def clear_joint_error(self, joint: int) -> None:
         """Clears the error word of a joint.
@@ -305,7 +305,7 @@ class RealManController:
             self.stop_at_once()
         self.is_powered = on
         self.enabled = [on] * self.model.n
-        self._rest()
+        self._hold()
 
     def set_error(self, error: RealManError, reason: Remark, joint: int = 0) -> None:
         """Shows an error, of a joint if it is one of its bits."""
@@ -341,7 +341,7 @@ class RealManController:
             self._configure()
 
     def add(self, target: Target, trajectory: Trajectory) -> None:
-        """Appends a target; it begins with the rest of its chain."""
+        """Appends a target; it begins with the others of its chain."""
         self.add_all(self.trajectories.add(target, trajectory))
 
     def add_all(self, targets: list[Target]) -> None:
@@ -453,7 +453,7 @@ class RealManController:
         arm.configure(parameters)
         self.drive.configure(self.limits, self.parameters.zero)
 
-    def _rest(self) -> None:
+    def _hold(self) -> None:
         is_held = self.is_powered and all(self.enabled) and self.button == "none"
         self.arm.resting_law = ControlLaw.POSITION if is_held else ControlLaw.BRAKED
 

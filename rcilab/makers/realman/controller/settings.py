@@ -1,4 +1,4 @@
-"""What a client sets beside the parameters of the joints: frames, speeds of the tool, signals, pushed states."""
+"""What a client sets besides the joints' parameters: frames, speeds of the tool, signals, pushed states."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def tool_pose(controller: RealManController) -> list[int]:
 
 
 def joint_currents(controller: RealManController) -> list[int]:
-    """Returns torques of the joints as currents, [mA]: 1 A a newton metre, a choice of rcilab."""
+    """Returns torques of the joints as currents, [mA]: 1 A a newton metre, rcilab's own value."""
     return [round(1e3 * torque) for torque in controller.arm.signals.measured.tau.tolist()]
 
 

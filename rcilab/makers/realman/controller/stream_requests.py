@@ -26,7 +26,7 @@ from rcilab.sim.planner import JointSpeed, Refusal, ToolSpeed
 from rcilab.sim.planner.stream_filter import StreamMode
 
 _MICRO, _MILLI = 1e-6, 1e-3
-_VELOCITY_TIMEOUT = 0.1  # [s] The tool stops when velocities cease for so long; a choice of rcilab.
+_VELOCITY_TIMEOUT = 0.1  # [s] The tool stops when velocities cease for so long; rcilab's own value.
 
 Stream: TypeAlias = Callable[[RealManController, Request], None]
 

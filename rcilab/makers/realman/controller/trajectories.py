@@ -26,7 +26,7 @@ class Trajectory:
 
 
 class TrajectoryQueue:
-    """Numbers targets, and keeps those that wait for the rest of their chain. Owned by the controller."""
+    """Numbers targets, and keeps those that wait for the others of their chain. Owned by the controller."""
 
     def __init__(self) -> None:
         self._number = 0

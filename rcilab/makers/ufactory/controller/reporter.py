@@ -1,7 +1,7 @@
 """The values of the reports, in the units of the wire.
 
 Currents, voltages, temperatures and a force sensor are not simulated: currents and forces are zero, the others are
-those of a real arm at rest.
+those of a real arm at standstill.
 """
 
 from __future__ import annotations

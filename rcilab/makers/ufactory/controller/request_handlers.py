@@ -47,7 +47,7 @@ class RequestHandlers:
 
     Args:
         controller: The controller.
-        identity: What the arm says it is.
+        identity: What the arm reports itself as.
         tasks: Commands that wait for their turn.
         log: Logs a refusal, by the name of its request and the reason.
     """

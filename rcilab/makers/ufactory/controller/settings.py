@@ -33,7 +33,7 @@ WIDEST_BOUNDARY = (9999, -9999, 9999, -9999, 9999, -9999)  # [mm] As the client 
 TOOL_SPEED = 1.0  # [m/s] User manual, 10.
 _SENSITIVITY_STEP = 0.2
 """By which each step of the collision sensitivity lowers the thresholds, from the largest torques of the joints at 1 to
-a fifth at 5; rcilab's own choice: the maker publishes no forces."""
+a fifth at 5; rcilab's own values: the maker publishes no forces."""
 
 RESETTING = frozenset(
     {

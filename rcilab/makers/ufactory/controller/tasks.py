@@ -1,4 +1,4 @@
-"""Commands whose client is told what becomes of them, and actions that wait for their turn in the queue."""
+"""Commands whose outcome is reported to the client, and actions that wait for their turn in the queue."""
 
 from __future__ import annotations
 
@@ -58,11 +58,11 @@ class Tasks:
                 self._tasks[number] = Task(task.peer, task.request, 0, task.action)
 
     def handle(self, event: TaskEvent, microseconds: int) -> None:
-        """Does what is due at an event, and tells the client."""
+        """Carries out what is due at an event, and informs the client."""
         if event.kind is EventKind.BEGAN:
             task = self._tasks.get(event.task)
             if task is not None and task.action is None and task.feedback & MOTION_START:
-                self._tell(event.task, task, MOTION_START, _SUCCESS, microseconds)
+                self._inform(event.task, task, MOTION_START, _SUCCESS, microseconds)
             return
         task = self._tasks.pop(event.task, None)
         if task is None:
@@ -73,9 +73,9 @@ class Tasks:
             if event.kind is EventKind.REACHED:
                 task.action()
         if task.feedback & kind:
-            self._tell(event.task, task, kind, _RESULTS[event.kind], microseconds)
+            self._inform(event.task, task, kind, _RESULTS[event.kind], microseconds)
 
-    def _tell(self, number: int, task: Task, kind: int, result: int, microseconds: int) -> None:
+    def _inform(self, number: int, task: Task, kind: int, result: int, microseconds: int) -> None:
         request = task.request
         feedback = Feedback(
             request.transaction, request.protocol, 0, kind, request.function, number, result, microseconds

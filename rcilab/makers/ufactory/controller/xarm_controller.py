@@ -74,7 +74,7 @@ LARGEST_QUEUE = 2048  # Motions; the client library itself waits from 512 or 102
 ALL_AXES = 8
 _SERVO_CYCLES = round(1e3 * SERVO_PERIOD)
 _SERVO_BURST = 2  # Commands that may come at once, so that a client of 250 Hz with jitter loses none.
-_OVERLOAD_CYCLES = 100  # That a drive may be at its largest torque; a choice.
+_OVERLOAD_CYCLES = 100  # That a drive may be at its largest torque; a tuning value.
 _SPEED_MARGIN = 1.001  # Rounding of the planner's differences.
 _MOTORLESS = (UfactoryError.EMERGENCY_STOP_BUTTON, UfactoryError.EMERGENCY_STOP_INPUT)
 _BUTTONS: dict[SafetyButton, UfactoryError] = {
@@ -418,7 +418,7 @@ class XArmController:
         if error in _MOTORLESS or UfactoryError.JOINT_1 <= error <= UfactoryError.JOINT_7:
             self.enabled = 0
         self._end_motions()
-        self._tell(self.planner.take_events())
+        self._handle_events(self.planner.take_events())
         self._feed.abort()
         self._set_state = State.STOPPED
 
@@ -428,9 +428,9 @@ class XArmController:
         self.gripper.step()
         self._tokens = min(self._tokens + 1.0 / _SERVO_CYCLES, _SERVO_BURST)
         self._update_arm()
-        self._choose_law()
+        self._choose_control_law()
         events, command_violations, measured_violations = self._feed.step()
-        self._tell(events)
+        self._handle_events(events)
         if command_violations or measured_violations:
             self._raise(command_violations or measured_violations)
         else:
@@ -443,15 +443,15 @@ class XArmController:
         self.robot_state = build_neutral_state(self)
         return self.robot_state
 
-    def _choose_law(self) -> None:
+    def _choose_control_law(self) -> None:
         """Guides the arm in mode 2; otherwise its motors hold it, or its brakes."""
         is_guided = self.mode is Mode.TEACH and self._set_state is State.READY
         if is_guided and not self._is_guided:
             self._feed.abort()
             self.arm.begin_guiding(FREE)
         self._is_guided = is_guided
-        law = ControlLaw.POSITION if self.has_motors else ControlLaw.BRAKED
-        self.arm.resting_law = ControlLaw.GUIDE if is_guided else law
+        held = ControlLaw.POSITION if self.has_motors else ControlLaw.BRAKED
+        self.arm.resting_law = ControlLaw.GUIDE if is_guided else held
 
     @property
     def _checked_limits(self) -> Limits:
@@ -460,7 +460,7 @@ class XArmController:
         unlimited = readonly_copy(np.full(self.model.n, inf))
         return replace(limits, joint=replace(limits.joint, acceleration=unlimited, jerk=unlimited, torque=unlimited))
 
-    def _tell(self, events: Iterable[PlannerEvent]) -> None:
+    def _handle_events(self, events: Iterable[PlannerEvent]) -> None:
         """Passes the events of tasks on; a target that cannot be followed is an error."""
         for event in events:
             self.on_task(TaskEvent(event.id, event.kind))
@@ -546,7 +546,7 @@ class XArmController:
     def refuse(self, refusal: Refusal) -> None:
         """Sets the error of a target that cannot be followed."""
         error = _REFUSALS.get(refusal.reason)
-        if error is None:  # Out of reach at the goal, or on the way to it.
+        if error is None:  # Out of reach at the goal, or on the path to it.
             error = UfactoryError.NO_SOLUTION if refusal.share >= 1.0 else UfactoryError.KINEMATICS
         self.fail(error, refusal.remark)
 

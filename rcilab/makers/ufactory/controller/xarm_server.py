@@ -38,7 +38,7 @@ from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.virtual_arm import VirtualArm
 
 _PROTOCOL = "xArm protocol"
-_MOST_CLIENTS = 16  # Of one port; a choice.
+_MOST_CLIENTS = 16  # Of one port; a tuning value.
 _SOCKET_NAME = "xarmcontroller_uds_{}"  # In the system's temporary folder, where clients look for it.
 _NOT_READY = (State.STOPPED, State.CHANGED)
 _FUNCTIONS = frozenset(Function)

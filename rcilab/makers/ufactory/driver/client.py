@@ -1,4 +1,4 @@
-"""A connection of the maker's client library: its calls, and what its slow reports say."""
+"""A connection of the maker's client library: its calls, and the content of its slow reports."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from rcilab.core.errors import CommandRejectedError, ConnectionLostError
 from rcilab.makers.ufactory.driver.library import load_client_library
-from rcilab.makers.ufactory.driver.links import Place
+from rcilab.makers.ufactory.driver.links import Endpoint
 from rcilab.makers.ufactory.errors import UfactoryError
 
 _TIMEOUT = 1.0  # [s] For an answer; the library's own is 2 s.
@@ -39,7 +39,7 @@ class XArmClient:
         slow: The newest slow report.
 
     Args:
-        place: Where the controller listens.
+        endpoint: Where the controller listens.
         name: Name of the controller in errors.
         n: Number of joints.
 
@@ -48,15 +48,15 @@ class XArmClient:
         MissingExtraError: It is not installed.
     """
 
-    def __init__(self, place: Place, name: str, n: int) -> None:
+    def __init__(self, endpoint: Endpoint, name: str, n: int) -> None:
         open_client = load_client_library()
         self.name = name
         self.slow: SlowReport | None = None
         self._n = n
         self._timeout = _TIMEOUT
         self._loss = ""  # Why the connection is lost.
-        options = {"forbid_uds": not place.is_local, "timed_comm": False, "check_cmdnum_limit": False}
-        self.api = open_client(place.host, is_radian=True, do_not_open=True, check_is_pause=False, **options)
+        options = {"forbid_uds": not endpoint.is_local, "timed_comm": False, "check_cmdnum_limit": False}
+        self.api = open_client(endpoint.host, is_radian=True, do_not_open=True, check_is_pause=False, **options)
         self.api.register_report_callback(
             self._receive, report_cartesian=False, report_joints=False, report_mtbrake=False, report_cmd_num=False
         )

@@ -1,6 +1,6 @@
 """A connection to a controller: its client library for requests, and its reports in real time as states.
 
-The reports say that the arm is stopped, but not by which error: that is asked for when it stops, and then follows the
+The reports show that the arm is stopped, but not by which error: that is asked for when it stops, and then follows the
 slow reports of the client library.
 """
 

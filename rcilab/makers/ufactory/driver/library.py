@@ -34,10 +34,11 @@ def load_client_library() -> Any:
             require_library("xarm.wrapper", "driving a UFACTORY arm", "xarm")
         logs = import_module("xarm.core.utils.log")
         logs.logger.disabled = logs.origin_logger.disabled = True
-        logs.logger.warn = logs.logger.warning  # The library still calls the deprecated one.
         for name, module in tuple(sys.modules.items()):
             if name.startswith("xarm."):
                 vars(module)["print"] = lambda *texts, **options: None
+    logger = import_module("xarm.core.utils.log").logger
+    logger.warn = logger.warning  # The library still calls the deprecated one.
     ports: Any = import_module("xarm.core.comm.socket_port")
     ports.socket = SimpleNamespace(**vars(socket) | {"setdefaulttimeout": lambda seconds: None})
     return import_module("xarm.wrapper").XArmAPI

@@ -1,4 +1,4 @@
-"""Connections to the ports of a controller, before and beside those of the client library.
+"""Connections to the ports of a controller, before and in addition to those of the client library.
 
 A virtual controller of a user who may not open port 502 listens at Unix-domain sockets. The client library connects to
 these, if they exist, whatever address it is given; so it may use them only where nothing answers at the address.
@@ -24,7 +24,7 @@ from rcilab.makers.ufactory.wire.identity import IDENTITIES
 _REQUEST = Struct(">HHHB")
 
 
-class Place(NamedTuple):
+class Endpoint(NamedTuple):
     """Where a controller listens."""
 
     host: str
@@ -36,7 +36,7 @@ class Place(NamedTuple):
         """Returns a connection to one of its ports.
 
         Raises:
-            OSError: There is none within the timeout, [s].
+            OSError: No connection within the timeout, [s].
         """
         if not self.is_local:
             return socket.create_connection((self.host, port), timeout)
@@ -50,7 +50,7 @@ class Place(NamedTuple):
         return link
 
 
-def find_arm(address: XArmAddress, timeout: float) -> tuple[str, Place]:
+def find_arm(address: XArmAddress, timeout: float) -> tuple[str, Endpoint]:
     """Returns the name of the arm at an address, and where its controller listens.
 
     Args:
@@ -61,16 +61,16 @@ def find_arm(address: XArmAddress, timeout: float) -> tuple[str, Place]:
         ConnectionLostError: No controller answers.
         ModelError: It has an arm that rcilab does not know.
     """
-    place = Place(find_route(address).host, is_local=False)
+    endpoint = Endpoint(find_route(address).host, is_local=False)
     start = time.monotonic()
     try:
         try:
-            link = place.connect(address.port, timeout)
+            link = endpoint.connect(address.port, timeout)
         except ConnectionRefusedError:
             if not (address.is_here and _socket_path(address.port).exists()):
                 raise
-            place = place._replace(is_local=True)
-            link = place.connect(address.port, timeout)
+            endpoint = endpoint._replace(is_local=True)
+            link = endpoint.connect(address.port, timeout)
     except OSError as error:
         spent = time.monotonic() - start
         reason = (
@@ -92,11 +92,11 @@ def find_arm(address: XArmAddress, timeout: float) -> tuple[str, Place]:
                 f"what answers at {address} is not a controller of a UFACTORY arm, or it is not ready yet ({reason}); "
                 "check the address, and connect again"
             ) from error
-    return _name_of(version, address), place
+    return _name_of(version, address), endpoint
 
 
 def _read_version(link: socket.socket) -> str:
-    """Returns what a controller says of itself: axes, type, two serial numbers, firmware."""
+    """Returns what a controller reports about itself: axes, type, two serial numbers, firmware."""
     link.sendall(_REQUEST.pack(1, PRIVATE[0], 1, Function.GET_VERSION))
     reader = FrameReader()
     while True:

@@ -10,12 +10,12 @@ from collections import deque
 from collections.abc import Sequence
 
 from rcilab.core.errors import ConnectionLostError
-from rcilab.makers.ufactory.driver.links import Place
+from rcilab.makers.ufactory.driver.links import Endpoint
 from rcilab.makers.ufactory.wire.reports import HIGH_RATE, ReportLayout
 
 _MS = 1000.0
 _BUFFER = 1 << 16
-_KEPT = 100  # Reports while nobody asks for them: those of half a second.
+_KEPT = 100  # Reports while none is read: those of half a second.
 _UNREAD = 0.05  # [s] A controller ends a connection whose reports are not read.
 
 
@@ -114,11 +114,11 @@ class ReportReceiver:
         return ConnectionLostError(self._failure)
 
 
-def open_receiver(place: Place, name: str, timeout: float) -> ReportReceiver:
+def open_receiver(endpoint: Endpoint, name: str, timeout: float) -> ReportReceiver:
     """Returns the receiver of a controller's reports in real time.
 
     Args:
-        place: Where it listens.
+        endpoint: Where it listens.
         name: Name of the controller in errors.
         timeout: For the connection, [s].
 
@@ -126,7 +126,7 @@ def open_receiver(place: Place, name: str, timeout: float) -> ReportReceiver:
         ConnectionLostError: It has none.
     """
     try:
-        return ReportReceiver(place.connect(HIGH_RATE.port, timeout), HIGH_RATE, name)
+        return ReportReceiver(endpoint.connect(HIGH_RATE.port, timeout), HIGH_RATE, name)
     except OSError as error:
         raise ConnectionLostError(
             f"{name}: the controller sends no reports at port {HIGH_RATE.port} ({error.strerror or error}), which has "

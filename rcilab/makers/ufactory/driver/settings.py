@@ -200,7 +200,7 @@ class XArmSettings:
             self._link.ask(self._client.enter, mode)
 
     def servo(self, q: JointVector) -> None:
-        """Sends a target of mode 1; an arm that does not follow it says why in its reports."""
+        """Sends a target of mode 1; an arm that does not follow it has the reason in its reports."""
         self._client.request("set_servo_angle_j", self.api.set_servo_angle_j, q.tolist())
 
     def move_j(
@@ -217,8 +217,8 @@ class XArmSettings:
             wait: Whether to return when the queue has ended, not at once.
         """
         q = bounded_vector("goal", goal, self._joints, "rad")
-        law = _law(speed, acceleration, JOINT_VELOCITY, JOINT_ACCELERATION, "rad", 1.0)
-        self._move("set_servo_angle", wait, angle=q.tolist(), radius=_radius(radius), **law)
+        options = _speed_options(speed, acceleration, JOINT_VELOCITY, JOINT_ACCELERATION, "rad", 1.0)
+        self._move("set_servo_angle", wait, angle=q.tolist(), radius=_radius(radius), **options)
 
     def move_l(
         self, goal: Pose, speed: float = 0.1, acceleration: float = 2.0, *, radius: float | None = None,
@@ -233,10 +233,10 @@ class XArmSettings:
             radius: Of the arc to the next line, [m]; None: the arm stops between them.
             wait: Whether to return when the queue has ended, not at once.
         """
-        law = _law(speed, acceleration, _FASTEST_TOOL, TOOL_ACCELERATION, "m", MILLIMETRE)
+        options = _speed_options(speed, acceleration, _FASTEST_TOOL, TOOL_ACCELERATION, "m", MILLIMETRE)
         names = ("x", "y", "z", "roll", "pitch", "yaw")
         pose = dict(zip(names, self._in_user_frame("goal", goal), strict=True))
-        self._move("set_position", wait, **pose, radius=_radius(radius), **law)
+        self._move("set_position", wait, **pose, radius=_radius(radius), **options)
 
     def move_c(
         self, via: Pose, goal: Pose, speed: float = 0.1, acceleration: float = 2.0, *, wait: bool = True
@@ -254,7 +254,7 @@ class XArmSettings:
             PlanningError: The positions define no circle.
             UsageError: Motions are in the queue: the start of the arc is where the arm stands.
         """
-        law = _law(speed, acceleration, _FASTEST_TOOL, TOOL_ACCELERATION, "m", MILLIMETRE)
+        options = _speed_options(speed, acceleration, _FASTEST_TOOL, TOOL_ACCELERATION, "m", MILLIMETRE)
         poses = self._in_user_frame("via", via), self._in_user_frame("goal", goal)
         with self._request("move_circle"):
             self._link.on_states(self._link.poll(0.1))
@@ -265,7 +265,7 @@ class XArmSettings:
             circle = build_arc(start.T_base_tool_c, via, goal).circle
             assert circle is not None  # Of every arc.
             share = 100.0 * circle.angle / (2.0 * math.pi)
-            self._move("move_circle", wait, pose1=list(poses[0]), pose2=list(poses[1]), percent=share, **law)
+            self._move("move_circle", wait, pose1=list(poses[0]), pose2=list(poses[1]), percent=share, **options)
 
     def wait(self) -> None:
         """Returns when the motions in the queue have ended; Ctrl-C stops them.
@@ -361,7 +361,7 @@ class XArmSettings:
         yield
 
 
-def _law(
+def _speed_options(
     speed: float, acceleration: float, fastest: float, strongest: float, unit: str, wire: float
 ) -> dict[str, float]:
     """Returns speed and acceleration in the units of the library, after checking them."""

@@ -39,16 +39,16 @@ def open_driver(address: str, timeout: float, expected: ExpectedArm | None) -> X
     """Returns a connection to a UFACTORY controller; see `rcilab.makers.driver.open_driver`."""
     parsed = parse_address(address)
     load_client_library()  # A missing library is reported also where no controller answers.
-    name, place = find_arm(parsed, timeout)
+    name, endpoint = find_arm(parsed, timeout)
     if expected is not None and name != expected.name:
         raise ModelError(
             f"the controller at {parsed} has an arm {name}, you gave {expected.name}; leave model out, or "
             f"load_model({name!r})"
         ).coded("other_arm", address=str(parsed), theirs=name, ours=expected.name)
     n = len(describe_robot(name).dh)
-    client = XArmClient(place, str(parsed), n)
+    client = XArmClient(endpoint, str(parsed), n)
     try:
-        connection = XArmConnection(client, open_receiver(place, str(parsed), timeout), n)
+        connection = XArmConnection(client, open_receiver(endpoint, str(parsed), timeout), n)
     except BaseException:
         client.close()
         raise

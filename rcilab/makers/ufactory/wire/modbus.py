@@ -148,7 +148,7 @@ def _decode_registers(data: bytes, count: int) -> tuple[int, ...]:
 def _mask_register(data: bytes, memory: ModbusMemory) -> bytes:
     address, keep, put = unpack(">HHH", data)
     (value,) = memory.read_holding(address, 1)
-    # As in the standard; the maker's document has the second mask in place of the value.
+    # As in the standard; the maker's document has the second mask instead of the value.
     memory.write_holding(address, [(value & keep) | (put & ~keep & 0xFFFF)])
     return data
 

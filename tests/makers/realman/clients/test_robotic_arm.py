@@ -38,7 +38,7 @@ def run(process: Process, mode: str, part: str, home: Path) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_every_joint_command_does_what_it_says(served: tuple[str, Process], mode: str, tmp_path: Path):
+def test_every_joint_command_has_its_effect(served: tuple[str, Process], mode: str, tmp_path: Path):
     model, process = served
     n = AXES[model]
     found = run(process, mode, "joint_commands", tmp_path)

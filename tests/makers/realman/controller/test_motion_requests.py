@@ -18,7 +18,7 @@ def moved(pose: list[int], x: int = 0, y: int = 0, z: int = 0) -> list[int]:
 
 @ARMS
 @pytest.mark.parametrize("command", ["movel", "movej_p"])
-def test_the_tool_arrives_at_its_pose_and_the_client_is_told_once(model, command):
+def test_the_tool_arrives_at_its_pose_and_the_client_is_informed_once(model, command):
     bench = Bench(model)
     goal = moved(bench.pose, x=-20000, z=50000)
     assert bench.ask(command, pose=goal, v=50, r=0, trajectory_connect=0) == {"command": command, "receive_state": True}
@@ -335,7 +335,7 @@ def test_links_that_would_touch_stop_the_arm_until_the_error_is_cleared():
     assert bench.run_until_event()["trajectory_state"] is True
 
 
-def test_generations_differ_in_what_they_say_about_themselves():
+def test_generations_differ_in_what_they_report_about_themselves():
     third, fourth = (Bench(generation=generation).ask("get_arm_software_info") for generation in (3, 4))
     assert "robot_controller_version" not in third
     assert third["plan_info"]

@@ -1,4 +1,4 @@
-"""Lines: any bytes give requests, or errors that say what is wrong."""
+"""Lines: any bytes give requests, or errors that name what is wrong."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every arm moves its joints and its tool, and answers what nobody should send."""
+"""Every arm moves its joints and its tool, and answers invalid requests."""
 
 from __future__ import annotations
 

@@ -18,8 +18,8 @@ AWAY = tuple(angle + 0.3 for angle in Q6)
 NOTHING = (0.0,) * 4  # The unused seventh joint, and the unused arguments of servo commands.
 
 
-def beside(arm: Arm, step: float = 40.0) -> tuple[float, ...]:
-    """Returns a pose that is so far beside the tool, [mm]."""
+def pose_aside(arm: Arm, step: float = 40.0) -> tuple[float, ...]:
+    """Returns a pose that is so far from the tool, [mm]."""
     x, y, z, *rpy = arm.pose
     return (x, y + step, z, *rpy)
 
@@ -30,7 +30,7 @@ def send(arm: Arm, command: Command) -> int:
         case Command.JOINTS:
             return arm.move_joints(AWAY)
         case Command.LINE:
-            return arm.move_line(beside(arm))
+            return arm.move_line(pose_aside(arm))
         case Command.CIRCLE:
             x, y, z, *rpy = arm.pose
             values = (x, y + 30.0, z, *rpy, x + 30.0, y, z, *rpy, 100.0, 1000.0, 0.0, 50.0)
@@ -40,7 +40,7 @@ def send(arm: Arm, command: Command) -> int:
         case Command.SERVO_JOINTS:
             return arm.call(Function.SERVO_JOINT, "10f", *Q6[:5], Q6[5] + 0.3, *NOTHING)[0]
         case Command.SERVO_POSE:
-            return arm.call(Function.SERVO_CARTESIAN, "9f", *beside(arm, 5.0), 0.0, 0.0, 0.0)[0]
+            return arm.call(Function.SERVO_CARTESIAN, "9f", *pose_aside(arm, 5.0), 0.0, 0.0, 0.0)[0]
         case Command.JOINT_VELOCITY:
             return arm.call(Function.JOINT_VELOCITY, "7fBf", *(0.2,) * 6, 0.0, 1, 0.0)[0]
         case Command.TOOL_VELOCITY:
@@ -264,10 +264,10 @@ def test_the_newest_servo_target_counts_at_180_degrees_per_second(arm: Arm) -> N
 
 def test_a_servo_pose_farther_than_10_mm_is_an_error(arm: Arm) -> None:
     arm.ready(Mode.SERVO)
-    arm.call(Function.SERVO_CARTESIAN, "9f", *beside(arm, 9.0), 0.0, 0.0, 0.0)
+    arm.call(Function.SERVO_CARTESIAN, "9f", *pose_aside(arm, 9.0), 0.0, 0.0, 0.0)
     arm.run()
     assert arm.error == (0, 0)
-    arm.call(Function.SERVO_CARTESIAN, "9f", *beside(arm, 12.0), 0.0, 0.0, 0.0)
+    arm.call(Function.SERVO_CARTESIAN, "9f", *pose_aside(arm, 12.0), 0.0, 0.0, 0.0)
     assert arm.error[0] == 24
 
 
@@ -307,7 +307,7 @@ def test_an_online_target_replaces_the_one_before_without_a_jump(arm: Arm) -> No
 
 def test_an_online_line_ends_at_the_newest_pose(arm: Arm) -> None:
     arm.ready(Mode.CARTESIAN_ONLINE)
-    first, second = beside(arm, 80.0), beside(arm, -30.0)
+    first, second = pose_aside(arm, 80.0), pose_aside(arm, -30.0)
     arm.move_line(first)
     arm.step(200)
     arm.move_line(second)
@@ -335,7 +335,7 @@ def feedbacks(arm: Arm) -> list[tuple[int, int]]:
     ],
     ids=["carried out", "discarded"],
 )
-def test_feedback_says_what_becomes_of_each_motion(
+def test_feedback_reports_the_outcome_of_each_motion(
     arm: Arm, then: Callable[[Arm], object], results: list[tuple[int, int]]
 ) -> None:
     arm.call(Function.SET_FEEDBACK, "B", 3)

@@ -1,4 +1,4 @@
-"""The reports of a connection: cut from a stream, kept while nobody asks for them, and refused if they are none."""
+"""The reports of a connection: cut from a stream, kept until they are read, and refused if they are not valid."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_reports_are_cut_from_the_stream(ends):
     assert receiver.poll(1.0) == (report(2), report(3))
 
 
-def test_the_newest_are_kept_while_nobody_asks_for_them(ends):
+def test_the_newest_are_kept_until_they_are_read(ends):
     """A controller ends the connection of a client that does not read."""
     controller, receiver = ends
     controller.settimeout(10.0)

@@ -37,7 +37,7 @@ def test_an_address_is_a_host():
         parse_address("xarm://192.168.1.185:503")
 
 
-def test_the_controller_says_which_arm_it_has(controller):
+def test_the_controller_reports_which_arm_it_has(controller):
     with connect(controller.address) as robot:
         assert robot.model.name == "xArm6"
         assert robot.state.q_c == pytest.approx(load_model("xArm6").home, abs=1e-6)
@@ -93,7 +93,7 @@ def test_a_controller_that_ends_is_reported_and_the_session_can_be_closed():
     controller.end()
 
 
-def test_no_robot_at_an_address_says_what_to_check():
+def test_no_robot_at_an_address_names_what_to_check():
     with pytest.raises(ConnectionLostError, match=r"no robot at xarm://127\.9\.9\.9:502 \(Connection refused.*label"):
         connect("xarm://127.9.9.9", load_model("xArm7"))
 

@@ -1,28 +1,28 @@
-"""The law of a path: its bounds, whatever happens on the way."""
+"""The time law of a path: its bounds, whatever happens along it."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from rcilab.sim.planner.path_law import PathLaw, Stretch
+from rcilab.sim.planner.path_time_law import PathTimeLaw, Stretch
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_law_keeps_the_bounds_of_every_stretch(seed: int) -> None:
+def test_a_time_law_keeps_the_bounds_of_every_stretch(seed: int) -> None:
     random = np.random.default_rng(seed)
     ends = np.cumsum(random.uniform(0.002, 0.2, 8))
     stretches = [
         Stretch(float(end), float(random.uniform(0.02, 0.5)), float(random.uniform(0.5, 3.0)), 20.0) for end in ends
     ]
-    law = PathLaw()
-    law.set_stretches(stretches[:3])
+    time_law = PathTimeLaw()
+    time_law.set_stretches(stretches[:3])
     rows = [(0.0, 0.0, 0.0)]
-    while not law.is_at_end:
+    while not time_law.is_at_end:
         if len(rows) == 40:
-            law.set_stretches([s for s in stretches if s.end > law.s])
-        law.step()
-        rows.append((law.s, law.ds, law.dds))
+            time_law.set_stretches([s for s in stretches if s.end > time_law.s])
+        time_law.step()
+        rows.append((time_law.s, time_law.ds, time_law.dds))
         assert len(rows) < 100_000
     s, ds, dds = np.array(rows).T
     assert (np.diff(s) >= 0.0).all(), "it never goes back"
@@ -46,19 +46,19 @@ def test_pauses_and_overrides_at_any_time_keep_bounds_and_end(seed: int) -> None
         Stretch(float(end), float(10.0 ** random.uniform(-1.5, 0.0)), float(10.0 ** random.uniform(0.0, 1.0)), 30.0)
         for end in ends
     ]
-    law = PathLaw()
-    law.set_stretches(stretches)
+    time_law = PathTimeLaw()
+    time_law.set_stretches(stretches)
     rows = [(0.0, 0.0, 0.0)]
-    while not law.is_at_end:
+    while not time_law.is_at_end:
         action = random.random()
         if action < 0.004:
-            law.pause()
+            time_law.pause()
         elif action < 0.012:
-            law.resume()
+            time_law.resume()
         elif action < 0.017:
-            law.set_override(float(random.choice([0.1, 0.5, 1.0])))
-        law.step()
-        rows.append((law.s, law.ds, law.dds))
+            time_law.set_override(float(random.choice([0.1, 0.5, 1.0])))
+        time_law.step()
+        rows.append((time_law.s, time_law.ds, time_law.dds))
         assert len(rows) < 200_000
     s, ds, dds = np.array(rows).T
     assert s.max() == pytest.approx(ends[-1], abs=1e-7)

@@ -11,8 +11,8 @@ from rcilab.sim.planner.velocity_change import change_distance, fastest_after, f
 
 _ROUNDING = 1.0 - 1e-7  # ruckig refuses a target velocity above its bound, and solves with a tolerance.
 _ENOUGH = 1.0 + 1e-6
-_TOLERANCE = 2e-8  # Of path lengths: ruckig ends up to 1e-8 beside a place.
-_SMALLEST = 1e-9  # Part of a stretch's velocity below which the law stands.
+_TOLERANCE = 2e-8  # Of path lengths: ruckig ends up to 1e-8 from a position.
+_SMALLEST = 1e-9  # Part of a stretch's velocity below which it stands still.
 
 
 class Stretch(NamedTuple):
@@ -28,7 +28,7 @@ class Stretch(NamedTuple):
     """Bound, above zero."""
 
 
-class PathLaw:
+class PathTimeLaw:
     """Moves along stretches, each with its own bounds, without a stop between them, to standstill at the last end.
 
     At the end of a stretch the acceleration is zero, and the velocity as high as both stretches and those ahead allow.
@@ -67,7 +67,7 @@ class PathLaw:
 
     @property
     def is_at_end(self) -> bool:
-        """Whether it stands at the end of the last stretch, or there is none."""
+        """Whether it stands at the end of the last stretch, or no stretch exists."""
         return not self._stretches
 
     def reset(self) -> None:
@@ -222,7 +222,7 @@ def _junction(
 def _fastest(w: float, length: float, acceleration: float, jerk: float) -> float:
     """Returns the largest velocity at one end of a stretch, for a velocity at the other.
 
-    A stretch begins at the first cycle in it, up to a cycle's way behind its begin.
+    A stretch begins at the first cycle in it, up to a cycle's distance behind its beginning.
     """
     first = fastest_before(w, length, acceleration, jerk)
     return fastest_before(w, max(0.0, length - max(first, w) * CYCLE_TIME), acceleration, jerk)
