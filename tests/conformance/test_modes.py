@@ -98,6 +98,8 @@ def expected(model: RobotModel, rows: Array, mode: Mode, start: StartState | Arr
     for row in table.rows(mode, has_elbow=model.n == 7, has_box=box is not None):
         values, _ = signals.table(row)
         lower, upper = row.bounds(model.limits)
+        if row.bounds_at is not None and row.depends_on_angles(model.limits.joint):
+            lower, upper = row.bounds_at(model.limits.joint, signals.angles_before())
         width = np.where(np.isfinite(lower) & np.isfinite(upper), upper - lower, 1e-3)
         close = np.minimum(np.abs(values - lower), np.abs(values - upper)) < NEAR * width
         places = (np.argwhere(mask).tolist() for mask in (~((lower < values) & (values < upper)), close))
