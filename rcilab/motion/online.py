@@ -206,7 +206,8 @@ class Jog:
         return np.array(self._axes.q)
 
     def _brake(self) -> None:
-        self._axes.step_to_velocity(self._zero_velocity)
+        if not self.is_stationary:  # It then stays exactly where it is.
+            self._axes.step_to_velocity(self._zero_velocity)
 
     def _go_to_target(self) -> None:
         self._axes.step_to_positions(self._goal, self._speeds)
