@@ -1,27 +1,8 @@
-"""The ECO65: 6 axes, 5 kg; axes 2 to 4 are parallel."""
+"""The ECO65: 6 axes, 5 kg."""
 
 from __future__ import annotations
 
-from math import pi
-
-from rcilab.makers.realman.robots.arm import ALGO, build_realman, chain_rods, realman_limits
-from rcilab.robots.description import CraigRow, rows_from_craig
-
-_BACK = -0.086  # [m] Axes 2 to 4 ahead of the base axis.
-_ASIDE = -0.05888  # [m] Distance of axis 5 from the plane of the arm.
-_FLANGE = _ASIDE + 0.0795  # [m]
-_SHOULDER = 0.1625  # [m]
-_ELBOW = _SHOULDER + 0.26  # [m]
-_WRIST = _ELBOW + 0.24  # [m]
-_HAND = _WRIST + 0.11  # [m]
-_ORIGINS = (
-    (0.0, 0.0, 0.0),
-    (_BACK, 0.0, _SHOULDER),
-    (_BACK, 0.0, _ELBOW),
-    (_BACK, _ASIDE, _WRIST),
-    (_BACK, _ASIDE, _HAND),
-    (_BACK, _FLANGE, _HAND),
-)
+from rcilab.makers.realman.robots.eco import build_eco
 
 _BODIES = (  # Mass, centre of mass, tensor.
     (
@@ -50,49 +31,14 @@ _BODIES = (  # Mass, centre of mass, tensor.
 )
 
 
-DESCRIPTION = build_realman(
+DESCRIPTION = build_eco(
     name="ECO65",
-    dh=rows_from_craig(
-        (
-            CraigRow(a=0.0, alpha=0.0, d=0.1625),
-            CraigRow(a=-0.086, alpha=-pi / 2, d=0.0, theta_offset=-pi / 2),
-            CraigRow(a=0.26, alpha=0.0, d=0.0),
-            CraigRow(a=0.24, alpha=0.0, d=-0.05888, theta_offset=+pi / 2),
-            CraigRow(a=0.0, alpha=+pi / 2, d=0.11),
-            CraigRow(a=0.0, alpha=-pi / 2, d=0.0795),
-            CraigRow(a=0.0, alpha=0.0, d=0.0),
-        )
-    ),
-    dh_source=f"{ALGO}, rm_algo_get_dh (Craig's convention), written as standard rows",
-    limits=realman_limits(
-        lower_deg=(-178, -178, -160, -178, -178, -360),
-        upper_deg=(178, 135, 145, 178, 178, 360),
-        speed_deg=(180, 180, 225, 225, 225, 225),
-        torque=(60, 60, 30, 10, 10, 10),
-        torque_source="limits of effort of the ECO63; the maker's file has a placeholder of 100 N m",
-    ),
+    upper_arm=0.26,
+    forearm=0.24,
+    aside=-0.05888,
+    lower_deg=(-178, -178, -160, -178, -178, -360),
+    upper_deg=(178, 135, 145, 178, 178, 360),
+    torque_source="limits of effort of the ECO63; the maker's file has a placeholder of 100 N m",
     bodies=_BODIES,
-    origins=_ORIGINS,
-    rods=chain_rods(
-        [
-            (0.0, 0.0, 0.045),
-            (0.0, 0.0, 0.08),
-            (0.0, 0.0, _SHOULDER),
-            (_BACK, 0.0, _SHOULDER),
-            (_BACK, -0.075, _SHOULDER),
-            (_BACK, -0.075, _ELBOW),
-            (_BACK, 0.01, _ELBOW + 0.01),
-            (_BACK, 0.01, _WRIST),
-            (_BACK, _ASIDE, _WRIST),
-            (_BACK, _ASIDE, _HAND - 0.03),
-            (_BACK, _ASIDE, _HAND),
-            (_BACK, _FLANGE - 0.05, _HAND),
-        ],
-        ((0, 1), (2, 3), (4, 5), (6, 7), (8, 9), (10, 11)),
-        (0.050, 0.050, 0.045, 0.038, 0.036, 0.038),
-        _ORIGINS,
-        direction=(0, 1, 0),
-    ),
-    home_deg=(0, 20, 70, 0, 90, 0),
     rated_payload=5.0,
 )
