@@ -134,7 +134,12 @@ class SimulationControl(Closeable):
         self.ask(Release())
 
     def press(self, button: SafetyButton) -> None:
-        """Presses the emergency stop ("estop") or opens the safety gate ("gstop"); "none" resets both."""
+        """Presses an emergency stop, opens the safety gate, or resets all ("none").
+
+        Args:
+            button: "estop", "gstop" for the gate, or "switch" for the stop of a three-position switch, where the arm
+                has it.
+        """
         self.ask(Press(button))
 
     def guide(self, on: bool = True) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection
 from dataclasses import asdict, dataclass
 
 from rcilab.core.clock import Clock
-from rcilab.core.errors import RcilabError, UsageError
+from rcilab.core.errors import InvalidValueError, RcilabError, UsageError
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import Pose
 from rcilab.sim.api import (
@@ -133,6 +133,9 @@ class Environment:
                 self._push.release()
                 self._apply_push()
             case Press(button):
+                known = self._controller.buttons
+                if button not in ("none", *known):
+                    raise InvalidValueError("button", button, f"does not exist on this arm; known: {', '.join(known)}")
                 self._controller.press_button(button)
             case Guide(on):
                 self._controller.guide(on)

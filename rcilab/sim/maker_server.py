@@ -85,6 +85,11 @@ class SimulatedController(Protocol):
         ...
 
     @property
+    def buttons(self) -> tuple[SafetyButton, ...]:
+        """The emergency stops that it has."""
+        ...
+
+    @property
     def button(self) -> SafetyButton:
         """The pressed emergency stop."""
         ...

@@ -224,7 +224,7 @@ def test_it_answers_every_thread_also_while_a_motion_runs(robot):
 def test_wrong_values_are_refused_here_and_impossible_ones_there(robot):
     with pytest.raises(InvalidValueError, match="wrench"):
         robot.world.push([1, 2, 3])
-    with pytest.raises(InvalidValueError, match="button: 'stop' is unknown; known: none, estop, gstop"):
+    with pytest.raises(InvalidValueError, match="button: 'stop' is unknown; known: none, estop, gstop, switch"):
         robot.world.press("stop")
     with pytest.raises(UsageError, match="plant='mujoco'"):
         robot.world.place_box("table", [1, 1, 0.1], Pose((0.5, 0.0, 0.2)))

@@ -106,7 +106,7 @@ _CAUSES = {
     UfactoryError.COLLISION: "the current of a motor differs from the expected one, as in a collision",
     UfactoryError.SAFETY_BOUNDARY: "the tool reached the safety boundary",
     UfactoryError.MANUAL_MODE: "the arm moves in manual mode without being guided",
-    UfactoryError.NO_SOLUTION: "the target cannot be reached with these joint angles",
+    UfactoryError.NO_SOLUTION: "the target has joint angles, but the path to it cannot be followed",
     UfactoryError.SERVO_LINEAR_SPEED: "joint targets of servo mode move the tool too fast",
 }
 _REMEDIES = {
@@ -126,7 +126,7 @@ _REMEDIES = {
     UfactoryError.COLLISION: "Remove the obstacle, clear the error; check load and collision sensitivity.",
     UfactoryError.SAFETY_BOUNDARY: "Clear the error and guide the arm back by hand in mode 2, or set a wider boundary.",
     UfactoryError.MANUAL_MODE: "Check that load and mounting direction are those of the arm, then clear the error.",
-    UfactoryError.NO_SOLUTION: "Choose another target.",
+    UfactoryError.NO_SOLUTION: "Move there by joint angles, or by way of other poses.",
     UfactoryError.SERVO_LINEAR_SPEED: "Send targets that are closer together, so that the tool stays below its limit.",
 }
 _WARNINGS = {

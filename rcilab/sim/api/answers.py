@@ -46,7 +46,7 @@ class WorldStatus:
     reason: str = ""
     """Reason for the last fault; a `Remark` if user interfaces can translate it."""
     button: str = "none"
-    """Which safety stop is pressed: none, estop, gstop."""
+    """Which safety stop is pressed: none, estop, gstop, switch."""
     q: tuple[float, ...] = ()
     """Measured joint angles, [rad]."""
     lost: int = 0

@@ -10,7 +10,7 @@ from rcilab.sim.api.faults import DIRECTIONS, LONGEST_STALL, LONGEST_TIME, Direc
 from rcilab.sim.api.fields import as_flag, as_float, as_floats, as_integer, as_joints, as_name, as_word
 
 Floats: TypeAlias = tuple[float, ...]
-SafetyButton: TypeAlias = Literal["none", "estop", "gstop"]
+SafetyButton: TypeAlias = Literal["none", "estop", "gstop", "switch"]
 
 _BUTTONS: tuple[SafetyButton, ...] = get_args(SafetyButton)
 _LARGEST_FORCE = 1e4  # [N], [N m] Far beyond the strength of any arm: it detects wrong units.
@@ -61,7 +61,10 @@ class Release:
 
 @dataclass(frozen=True, slots=True)
 class Press:
-    """Presses the emergency stop ("estop") or opens the safety gate ("gstop"); "none" resets both."""
+    """Presses an emergency stop, opens the safety gate, or resets all ("none").
+
+    "estop" is the button, "gstop" the gate, "switch" the button of a three-position switch, which UFACTORY's arms have.
+    """
 
     name: ClassVar[str] = "press"
     button: SafetyButton

@@ -107,12 +107,19 @@ class ToolMover:
             try:
                 q = self._arm.solver.next_to(plan.at(share * plan.duration), q)
             except KinematicsError as error:
-                return refusal_of(error, share)
+                return refusal_of(error, share if self._reaches(plan.at(plan.duration)) else 1.0)
             refusal = find_outside(q, ends, share)
             if refusal is not None:
                 return refusal
             rows.append(q)
         return rows
+
+    def _reaches(self, pose: Pose) -> bool:
+        try:
+            self._arm.solver.nearest(pose, self._q)
+        except KinematicsError:
+            return False
+        return True
 
     def _excess(self, plan: _PosePlan, rows: list[list[float]]) -> list[float]:
         """Returns by what factors velocity, acceleration and jerk exceed the joints' bounds; 1 where they do not.

@@ -91,6 +91,7 @@ class FciController:
 
     loop_back = False
     auto_limit = False
+    buttons: tuple[SafetyButton, ...] = ("estop",)
 
     def __init__(self, arm: VirtualArm, version: FciVersion) -> None:
         self.arm, self.version = arm, version

@@ -79,6 +79,7 @@ class RealManController:
 
     loop_back = False
     auto_limit = False
+    buttons: tuple[SafetyButton, ...] = ("estop",)
     limit_table = "manual"
     wants_commands = False
     awaits_start = False

@@ -98,6 +98,8 @@ class RciController:
         coulomb: Coulomb friction of the joints that LoadRobotModel serves, n numbers, [N m]; None: none.
     """
 
+    buttons: tuple[SafetyButton, ...] = ("estop", "gstop")
+
     def __init__(
         self,
         arm: VirtualArm,

@@ -15,6 +15,7 @@ from rcilab.makers.ufactory.bounds import SERVO_STEP, TOOL_ROTATION
 from rcilab.makers.ufactory.controller.modes import Answer, Command
 from rcilab.makers.ufactory.controller.queue_end import absolute_pose, relative_pose, tool_pose
 from rcilab.makers.ufactory.controller.xarm_controller import XArmController
+from rcilab.makers.ufactory.errors import UfactoryError
 from rcilab.makers.ufactory.wire.functions import Function
 from rcilab.makers.ufactory.wire.poses import MILLIMETRE
 from rcilab.sim.planner import (
@@ -288,12 +289,12 @@ def _check(controller: XArmController, target: Target) -> int:
         elif isinstance(target, (LineTarget, ArcTarget)):
             q = controller.find_end().solve(target.pose)
     except KinematicsError:
-        return 40
+        return UfactoryError.KINEMATICS
     if q is None:
         return 0
     joint = controller.motion_limits.joint
     is_inside = bool(np.all(np.array(q) >= joint.lower) and np.all(np.array(q) <= joint.upper))
-    return 0 if is_inside else 23
+    return 0 if is_inside else UfactoryError.JOINT_RANGE
 
 
 def _joints(controller: XArmController, values: Sequence[float]) -> tuple[float, ...]:

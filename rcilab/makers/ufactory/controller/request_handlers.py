@@ -215,6 +215,10 @@ def _set(is_valid: bool, name: str, value: object, problem: str) -> bytes:
     return b""
 
 
+def _set_mode(controller: XArmController, mode: int, is_undetected: int = 0) -> bool:
+    return controller.set_mode(mode, detects_motion=not is_undetected)
+
+
 def _clean_error(controller: XArmController) -> bytes:
     controller.clean_error()
     return b""
@@ -242,7 +246,7 @@ _SIMPLE: dict[Function, _Simple] = {
     Function.MOTION_ENABLE: lambda c, i, v: _set(c.enable(v[0], bool(v[1])), "joint", v[0], "must be a joint, or 8"),
     Function.SET_BRAKE: lambda c, i, v: _set(c.enable(v[0], not v[1]), "joint", v[0], "must be a joint, or 8"),
     Function.SET_STATE: lambda c, i, v: _set(c.set_state(v[0]), "state", v[0], "must be 0, 3, 4 or 6"),
-    Function.SET_MODE: lambda c, i, v: _set(c.set_mode(v[0]), "mode", v[0], "must be 0, 1, 2, 4, 5, 6 or 7"),
+    Function.SET_MODE: lambda c, i, v: _set(_set_mode(c, *v), "mode", v[0], "must be 0, 1, 2, 4, 5, 6 or 7"),
     Function.GET_STATE: lambda c, i, v: bytes([c.shown_state]),
     Function.GET_COMMAND_COUNT: lambda c, i, v: encode_values("H", min(c.queued, 0xFFFF)),
     Function.GET_ERROR: lambda c, i, v: bytes([c.error or 0, c.warning or 0]),

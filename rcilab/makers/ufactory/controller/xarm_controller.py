@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rcilab.conformance.common_conditions import VELOCITY_ALLOWANCE
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.errors import UsageError
 from rcilab.core.fault import FaultCode
@@ -22,7 +23,7 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
 from rcilab.i18n.translator import Remark
-from rcilab.makers.ufactory.bounds import SERVO_PERIOD
+from rcilab.makers.ufactory.bounds import JOINT_VELOCITY, SERVO_PERIOD
 from rcilab.makers.ufactory.controller.gripper import Gripper
 from rcilab.makers.ufactory.controller.modes import (
     SET_PAUSED,
@@ -75,14 +76,15 @@ ALL_AXES = 8
 _SERVO_CYCLES = round(1e3 * SERVO_PERIOD)
 _SERVO_BURST = 2  # Commands that may come at once, so that a client of 250 Hz with jitter loses none.
 _OVERLOAD_CYCLES = 100  # That a drive may be at its largest torque; a tuning value.
+_DETECTION_CYCLES = 300  # After the start of mode 2, before a hand reaches the arm; a tuning value.
+_DETECTION_SPEED = 0.2  # [rad/s] Which an arm with half a kilogram more than its load exceeds in this time.
 _SPEED_MARGIN = 1.001  # Rounding of the planner's differences.
-_MOTORLESS = (UfactoryError.EMERGENCY_STOP_BUTTON, UfactoryError.EMERGENCY_STOP_INPUT)
 _BUTTONS: dict[SafetyButton, UfactoryError] = {
     "estop": UfactoryError.EMERGENCY_STOP_BUTTON,
     "gstop": UfactoryError.EMERGENCY_STOP_INPUT,
+    "switch": UfactoryError.EMERGENCY_STOP_SWITCH,
 }
 _REFUSALS = {
-    RefusalReason.SINGULAR: UfactoryError.KINEMATICS,
     RefusalReason.JOINT_RANGE: UfactoryError.JOINT_RANGE,
     RefusalReason.GEOMETRY: UfactoryError.PLANNING,
     RefusalReason.STEP: UfactoryError.SPEED,
@@ -120,6 +122,7 @@ class XArmController:
     """
 
     auto_limit = False
+    buttons: tuple[SafetyButton, ...] = ("estop", "gstop", "switch")
     limit_table = "manual"
     awaits_start = wants_commands = is_starved = lacks_commands = False
 
@@ -145,6 +148,8 @@ class XArmController:
         self._is_outdated = False  # Settings have changed that the arm has not yet.
         self._was_following = False
         self._is_guided = False
+        self._detects_motion = True  # At the start of mode 2.
+        self._guided_for = 0  # Cycles.
         self._number = 0
         self._tokens = float(_SERVO_BURST)
         self._last_excess = 0.0
@@ -312,10 +317,16 @@ class XArmController:
         self._set_state = State.STOPPED
         return True
 
-    def set_mode(self, number: int) -> bool:
-        """Sets the mode; returns False for a number without one."""
+    def set_mode(self, number: int, *, detects_motion: bool = True) -> bool:
+        """Sets the mode; returns False for a number without one.
+
+        Args:
+            number: Of the mode.
+            detects_motion: Whether an arm that moves at the start of mode 2 is an error.
+        """
         if number not in tuple(Mode):
             return False
+        self._detects_motion = detects_motion
         if number != self.mode:
             self.mode = Mode(number)
             self.reset_state()
@@ -415,7 +426,7 @@ class XArmController:
     def fail(self, error: UfactoryError, reason: Remark) -> None:
         """Sets an error and stops the arm."""
         self.error, self.reason = error, reason
-        if error in _MOTORLESS or UfactoryError.JOINT_1 <= error <= UfactoryError.JOINT_7:
+        if error in _BUTTONS.values() or UfactoryError.JOINT_1 <= error <= UfactoryError.JOINT_7:
             self.enabled = 0
         self._end_motions()
         self._handle_events(self.planner.take_events())
@@ -433,6 +444,8 @@ class XArmController:
         self._handle_events(events)
         if command_violations or measured_violations:
             self._raise(command_violations or measured_violations)
+        elif self._is_guided:
+            self._watch_guiding()
         else:
             self._watch()
         if self._set_state is State.STOPPING and self.planner.state is not PlannerState.MOVING:
@@ -449,6 +462,7 @@ class XArmController:
         if is_guided and not self._is_guided:
             self._feed.abort()
             self.arm.begin_guiding(FREE)
+            self._guided_for = 0
         self._is_guided = is_guided
         held = ControlLaw.POSITION if self.has_motors else ControlLaw.BRAKED
         self.arm.resting_law = ControlLaw.GUIDE if is_guided else held
@@ -481,6 +495,19 @@ class XArmController:
             self._check_motion()
         else:
             self._end_online(EventKind.REACHED)
+
+    def _watch_guiding(self) -> None:
+        """Checks the speed of the guided joints, which is small before a hand reaches the arm."""
+        self._guided_for += 1
+        dq = np.abs(self.arm.signals.measured.dq)
+        joint, speed = int(dq.argmax()) + 1, float(dq.max())
+        error, bound = UfactoryError.MEASURED_SPEED, VELOCITY_ALLOWANCE * JOINT_VELOCITY
+        if self._detects_motion and self._guided_for <= _DETECTION_CYCLES:
+            error, bound = UfactoryError.MANUAL_MODE, _DETECTION_SPEED
+        if speed > bound:
+            text = f"joint {joint}: its speed of {speed:.3g} rad/s in mode 2 is above {bound:.3g} rad/s"
+            remark = Remark(text, "guided_speed", joint=joint, value=speed, bound=bound, unit="rad/s")
+            self.fail(error, remark)
 
     def _excess(self) -> float:
         """Returns how far the commanded tool is outside the boundary, [mm]; 0 inside, or without one."""
@@ -546,8 +573,8 @@ class XArmController:
     def refuse(self, refusal: Refusal) -> None:
         """Sets the error of a target that cannot be followed."""
         error = _REFUSALS.get(refusal.reason)
-        if error is None:  # Out of reach at the goal, or on the path to it.
-            error = UfactoryError.NO_SOLUTION if refusal.share >= 1.0 else UfactoryError.KINEMATICS
+        if error is None:  # The target has no joint angles, or only the path to it.
+            error = UfactoryError.KINEMATICS if refusal.share >= 1.0 else UfactoryError.NO_SOLUTION
         self.fail(error, refusal.remark)
 
     def _raise(self, violations: Violations) -> None:

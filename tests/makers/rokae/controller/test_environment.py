@@ -105,6 +105,8 @@ def test_the_status_has_what_was_chosen_and_counted(place) -> None:
     assert place.cycle.settings.inputs == (False, False, True, False, False, False)
     assert (place.status.missed, place.status.bad_datagrams, place.status.unknown_senders) == (3, 4, 5)
     assert place.status.phase == "idle"
+    no_switch = "button: 'switch' does not exist on this arm; known: estop, gstop"
+    assert place.handle(world.Press("switch")) == world.Refused(no_switch)
     place.handle(world.Press("gstop"))
     place.step()
     assert (place.status.button, place.status.phase) == ("gstop", "user_stopped")

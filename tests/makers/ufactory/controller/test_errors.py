@@ -13,6 +13,7 @@ from rcilab.makers.ufactory.controller.modes import Mode, State
 from rcilab.makers.ufactory.controller.xarm_controller import LARGEST_QUEUE
 from rcilab.makers.ufactory.wire.frame import STATUS_ERROR, STATUS_INVALID, STATUS_WARNING
 from rcilab.makers.ufactory.wire.functions import Function
+from rcilab.model.dynamics.payload import Payload
 from rcilab.sim.arm_setup import ArmSetup
 from tests.makers.ufactory.controller.conftest import ALL, Q6, Arm
 
@@ -25,6 +26,17 @@ def press(arm: Arm) -> None:
 
 def open_input(arm: Arm) -> None:
     arm.controller.press_button("gstop")
+
+
+def press_switch(arm: Arm) -> None:
+    arm.controller.press_button("switch")
+
+
+def over_the_base(arm: Arm) -> None:
+    """Moves on a line between two reachable poses that passes the axis of joint 1."""
+    arm.controller.set_up(ArmSetup(q=Q6))
+    x, y, z, roll, pitch, yaw = arm.pose
+    arm.move_line((-x, -y, z, roll, pitch, yaw))
 
 
 def out_of_reach(arm: Arm) -> None:
@@ -75,6 +87,7 @@ def leave_the_reduced_range(arm: Arm) -> None:
 CAUSES: list[tuple[int, Callable[[Arm], None]]] = [
     (1, press),
     (2, open_input),
+    (3, press_switch),
     (21, out_of_reach),
     (22, through_itself),
     (23, beyond_the_range),
@@ -82,6 +95,7 @@ CAUSES: list[tuple[int, Callable[[Arm], None]]] = [
     (24, fast_at_a_singularity),
     (25, points_on_a_line),
     (35, leave_the_boundary),
+    (40, over_the_base),
     (60, fast_servo_targets),
 ]
 
@@ -160,6 +174,37 @@ def test_a_drive_at_its_largest_torque_is_the_error_of_its_joint_and_switches_mo
     assert arm.controller.enabled == 0
 
 
+def test_a_joint_that_is_pushed_faster_than_its_limit_is_an_error_in_motion() -> None:
+    arm = blocked(0)
+    arm.controller.arm.plant.push((0.0, 0.0, 0.0, 0.0, 0.0, 500.0))
+    arm.run(most=1000, until=lambda: arm.controller.error is not None)
+    assert arm.controller.error == 30
+    assert "velocity" in str(arm.controller.reason)
+
+
+def test_a_joint_that_is_pushed_faster_than_its_limit_is_an_error_in_mode_2() -> None:
+    arm = Arm(plant="mujoco")
+    arm.controller.set_up(ArmSetup(q=Q6))
+    arm.ready(Mode.TEACH)
+    arm.step(400)
+    arm.controller.arm.plant.push((0.0, 150.0, 0.0, 0.0, 0.0, 0.0))
+    arm.run(most=1000, until=lambda: arm.controller.error is not None)
+    assert arm.controller.error == 30
+    assert arm.state == State.STOPPED
+
+
+@pytest.mark.parametrize(("undetected", "error"), [(0, 37), (1, None)])
+def test_an_arm_with_another_load_moves_by_itself_in_mode_2(undetected: int, error: int | None) -> None:
+    arm = Arm(plant="mujoco")
+    arm.controller.set_up(ArmSetup(q=Q6))
+    arm.controller.arm.plant.mount(Payload(mass=1.0, center_of_mass=np.array([0.0, 0.0, 0.05])))
+    arm.ready()
+    arm.call(Function.SET_MODE, "2B", Mode.TEACH, undetected)
+    arm.call(Function.SET_STATE, "B", 0)
+    arm.step(400)
+    assert arm.controller.error == error
+
+
 @pytest.mark.parametrize(
     ("warning", "function", "code", "values"),
     [
@@ -202,7 +247,7 @@ def test_a_full_queue_is_a_warning(arm: Arm) -> None:
 def test_a_checked_pose_does_not_move_the_arm(arm: Arm) -> None:
     before = arm.q
     far = (2000.0, 0.0, 300.0, 3.1, 0.0, 0.0)
-    for pose, error in ((arm.pose, 0), (far, 40)):
+    for pose, error in ((arm.pose, 0), (far, 21)):
         _, payload = arm.call(Function.MOVE_LINE, "10f3B", *pose, 100.0, 1000.0, 0.0, -1.0, 0, 0, 1)
         assert payload == bytes((0, 0, error))
     arm.step(20)
