@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from rcilab.core.errors import RcilabError as RcilabError
     from rcilab.core.safety_box import SafetyBox as SafetyBox
     from rcilab.core.spatial import Pose as Pose
+    from rcilab.execution.connect import connect as connect
     from rcilab.execution.session import RobotSession as RobotSession
-    from rcilab.execution.session import connect as connect
     from rcilab.model.dynamics.payload import Payload as Payload
     from rcilab.model.robot_model import RobotModel as RobotModel
     from rcilab.model.robot_model import load_model as load_model
@@ -60,7 +60,7 @@ _HOMES = {
     "ClearanceLimit": "rcilab.core.clearance",
     "Waypoint": "rcilab.motion.waypoint",
     "check": "rcilab.conformance.check",
-    "connect": "rcilab.execution.session",
+    "connect": "rcilab.execution.connect",
     "load_model": "rcilab.model.robot_model",
     "load_run": "rcilab.recording.run",
     "plan_arc": "rcilab.motion.cartesian",

@@ -204,7 +204,7 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
 
 def _connect(args: Namespace, model: RobotModel | None, report: Callable[[str], None]) -> RobotSession:
     """Returns a session; reports what differs from the model's tool and load."""
-    from rcilab.execution.session import connect
+    from rcilab.execution.connect import connect
 
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")

@@ -422,6 +422,19 @@ LOST_COMMANDS = Condition(
     bounds=lambda limits: symmetric_bounds(LOST_COMMANDS_THRESHOLD),
 )
 
+LINK_DISTANCE = Condition(
+    id="links.distance",
+    quantity="distance between links",
+    formula="d > 0",
+    necessity="necessary",
+    unit="m",
+    stage="throughout",
+    signal="link_distance",
+    order=0,
+    bounds=lambda limits: (np.array([0.0]), np.array([math.inf])),
+)
+"""Condition of controllers that notice links of their arm that overlap; no maker publishes a distance."""
+
 COMMON_CONDITIONS = ConditionTable(
     name="common table",
     motion=(*JOINT_CONDITIONS, *MOTION_TORQUE_CONDITIONS, *JOINT_END_CONDITIONS),

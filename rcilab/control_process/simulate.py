@@ -8,7 +8,8 @@ import numpy as np
 
 from rcilab.control_process.launch import start_controller
 from rcilab.core.errors import ModelError
-from rcilab.execution.session import RobotSession, open_session
+from rcilab.execution.connect import open_session
+from rcilab.execution.session import RobotSession
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.makers.maker import find_missing_feature, require_simulator

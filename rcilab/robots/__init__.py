@@ -8,6 +8,7 @@ module.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
@@ -45,4 +46,14 @@ def describe_robot(name: str) -> RobotDescription:
         raise ModelError(f"{plain_text(repr(name), 60)} is a file; this takes the name of an arm, such as xMatePro7")
     if "/" in name or "." in name:
         raise ModelError(f"{plain_text(repr(name), 60)} is not the file of an arm, which ends in .json")
-    raise ModelError(f"unknown robot {plain_text(repr(name), 60)}; known robots: {', '.join(ROBOT_NAMES)}")
+    raise ModelError(f"unknown robot {plain_text(repr(name), 60)}; {_suggest(name)}")
+
+
+def _suggest(name: str) -> str:
+    """Returns which name may be meant: a maker's, one with other punctuation, or a similar one."""
+    if own := ROBOTS_BY_MAKER.get(name.lower()):
+        return f"that is a maker, its robots: {', '.join(own)}"
+    plain = {"".join(filter(str.isalnum, known)).lower(): known for known in ROBOT_NAMES}
+    close = get_close_matches("".join(filter(str.isalnum, name)).lower(), plain, n=1, cutoff=0.75)
+    hint = f"did you mean {plain[close[0]]}? " if close else ""
+    return f"{hint}known robots: {', '.join(ROBOT_NAMES)}"

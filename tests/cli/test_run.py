@@ -16,7 +16,7 @@ from rcilab.cli import main
 from rcilab.control_process.launch import start_controller
 from rcilab.core.command import JointPosition
 from rcilab.core.errors import ControlError
-from rcilab.execution.session import connect
+from rcilab.execution.connect import connect
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model

@@ -11,7 +11,7 @@ from rcilab import JointPosition, load_model, plan_joint
 from rcilab.cli import main
 from rcilab.control_process.launch import start_controller
 from rcilab.core.errors import ControlError
-from rcilab.execution.session import connect
+from rcilab.execution.connect import connect
 
 MODEL = load_model("xMate3")
 

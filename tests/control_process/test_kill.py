@@ -20,7 +20,7 @@ from rcilab.control_process.launch import start_controller
 from rcilab.control_process.process_monitor import ProcessMonitor
 from rcilab.control_process.process_supervisor import ProcessSupervisor
 from rcilab.core.errors import ConnectionLostError
-from rcilab.execution.session import connect
+from rcilab.execution.connect import connect
 from rcilab.makers.virtual_controller import build_virtual_controller
 from rcilab.motion import plan_joint
 from rcilab.sim.controller_config import ControllerConfig

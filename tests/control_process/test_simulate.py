@@ -26,7 +26,7 @@ from rcilab.core.errors import (
     UsageError,
 )
 from rcilab.core.spatial import Pose
-from rcilab.execution.session import connect, open_session
+from rcilab.execution.connect import connect, open_session
 from rcilab.makers.rokae.driver.identify import identify_robot
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rcilab.execution.session import open_session
+from rcilab.execution.connect import open_session
 from tests.execution.peer import MODEL, Peer, Script
 
 

@@ -15,8 +15,8 @@ from rcilab.control_process.launch import start_controller
 from rcilab.core.command import CartesianPosition
 from rcilab.core.errors import ConnectionLostError, DeadlineError, InvalidValueError, ModelError
 from rcilab.core.spatial import Pose
+from rcilab.execution.connect import connect
 from rcilab.execution.load_comparison import describe_other_load
-from rcilab.execution.session import connect
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.driver.identify import require_same_arm
 from rcilab.model.dynamics.payload import Payload

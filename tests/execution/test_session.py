@@ -11,7 +11,7 @@ import pytest
 from rcilab.core.command import JointPosition
 from rcilab.core.errors import ConnectionLostError, UsageError
 from rcilab.core.spatial import Pose
-from rcilab.execution.session import connect
+from rcilab.execution.connect import connect
 from rcilab.makers.rokae import wire as rci
 from rcilab.motion import plan_joint
 from tests.execution.peer import MODEL, Peer, assert_controlled_stop, wave

@@ -14,7 +14,7 @@ from rcilab.core.command import CartesianPosition, JointPosition
 from rcilab.core.errors import CommandRejectedError, ConnectionLostError, ControlError, InvalidValueError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY, Pose
-from rcilab.execution.session import connect
+from rcilab.execution.connect import connect
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.rokae.wire import SafetyStop
 from rcilab.model.dynamics.payload import Payload

@@ -27,7 +27,7 @@ from rcilab.core.errors import (
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotMode
-from rcilab.execution.session import connect
+from rcilab.execution.connect import connect
 from rcilab.makers.rokae.controller.state_machine import QUERIES, Phase, transition
 from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.wire import CommandCode, RecoveryStatus, SafetyStop, SettingStatus

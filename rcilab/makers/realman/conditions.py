@@ -6,10 +6,7 @@ its tool, which a client can change; the page "Appendix: error codes" names the 
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
-
-import numpy as np
 
 from rcilab.conformance.common_conditions import (
     CARTESIAN_FRAME,
@@ -19,6 +16,7 @@ from rcilab.conformance.common_conditions import (
     JOINT_END_CONDITIONS,
     JOINT_POSITION,
     JOINT_VELOCITY,
+    LINK_DISTANCE,
     MEASURED_CONDITIONS,
     MOTION_TORQUE_CONDITIONS,
     START_POSE,
@@ -80,18 +78,10 @@ _MEASURED = tuple(
     for row in MEASURED_CONDITIONS
     if (row.signal, row.order) in _MEASURED_ERRORS
 )
-_LINKS = Condition(
-    id="links.distance",
-    quantity="distance between links",
-    formula="d > 0",
-    necessity="necessary",
-    unit="m",
-    source=f"{_ERRORS}, self-collision; bound: rcilab, the page has no distance",
+_LINKS = replace(
+    LINK_DISTANCE,
     fault=RealManError.SELF_COLLISION,
-    stage="throughout",
-    signal="link_distance",
-    order=0,
-    bounds=lambda limits: (np.array([0.0]), np.array([math.inf])),
+    source=f"{_ERRORS}, self-collision; bound: rcilab, the page has no distance",
 )
 
 REALMAN_CONDITIONS = ConditionTable(

@@ -10,10 +10,7 @@ speeds within these, and a safety boundary is the box of `cartesian.position`.
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
-
-import numpy as np
 
 from rcilab.conformance.common_conditions import (
     CARTESIAN_FRAME,
@@ -21,6 +18,7 @@ from rcilab.conformance.common_conditions import (
     EXTERNAL_TORQUE,
     JOINT_CONDITIONS,
     JOINT_END_CONDITIONS,
+    LINK_DISTANCE,
     MEASURED_CONDITIONS,
     MOTION_TORQUE_CONDITIONS,
     START_POSE,
@@ -28,7 +26,7 @@ from rcilab.conformance.common_conditions import (
     TOOL_STANDSTILL_CONDITIONS,
 )
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.condition import Condition, ConditionTable, all_limits, symmetric_bounds
+from rcilab.core.condition import ConditionTable, all_limits, symmetric_bounds
 from rcilab.makers.ufactory.bounds import REPORT_PERIOD, SERVO_SPEED_FACTOR, SERVO_STEP
 from rcilab.makers.ufactory.errors import UfactoryError
 
@@ -101,18 +99,10 @@ _BEHAVIOUR = (
         fault=UfactoryError.COLLISION,
         source=f"{_MANUAL}, 12; the threshold follows from the collision sensitivity, the maker gives no figure",
     ),
-    Condition(
-        id="links.distance",
-        quantity="distance between links",
-        formula="d > 0",
-        necessity="necessary",
-        unit="m",
-        source=f"{_MANUAL}, 6.4.3 and 12; bound: rcilab, the manual has no distance",
+    replace(
+        LINK_DISTANCE,
         fault=UfactoryError.SELF_COLLISION,
-        stage="throughout",
-        signal="link_distance",
-        order=0,
-        bounds=lambda limits: (np.array([0.0]), np.array([math.inf])),
+        source=f"{_MANUAL}, 6.4.3 and 12; bound: rcilab, the manual has no distance",
     ),
 )
 

@@ -16,7 +16,7 @@ from rcilab.control_process.launch import VirtualController, start_controller
 from rcilab.core.command import JointPosition
 from rcilab.core.errors import ConnectionLostError, InvalidValueError, ModelError
 from rcilab.core.optional_deps import MissingExtraError
-from rcilab.execution.session import connect
+from rcilab.execution.connect import connect
 from rcilab.makers.franka.driver import libraries
 from rcilab.makers.franka.driver.address import FciAddress, parse_address
 from rcilab.makers.franka.driver.handshake import find_version

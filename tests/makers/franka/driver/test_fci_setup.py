@@ -13,7 +13,7 @@ from rcilab.core.command import JointPosition
 from rcilab.core.errors import CommandRejectedError, ControlError, InvalidValueError, ModelError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
-from rcilab.execution.session import connect
+from rcilab.execution.connect import connect
 from rcilab.makers.configuration import ControllerParameters, RobotConfiguration
 from rcilab.makers.franka.driver.settings import body_of
 from rcilab.makers.franka.errors import FrankaError

@@ -16,7 +16,7 @@ from rcilab.control_process.launch import VirtualController, start_controller
 from rcilab.core.command import JointPosition
 from rcilab.core.errors import ConnectionLostError, InvalidValueError, ModelError
 from rcilab.core.optional_deps import MissingExtraError
-from rcilab.execution.session import connect
+from rcilab.execution.connect import connect
 from rcilab.makers.ufactory.driver import links
 from rcilab.makers.ufactory.driver.address import XArmAddress, parse_address
 from rcilab.model.robot_model import load_model
@@ -57,7 +57,7 @@ def test_the_process_is_left_as_it_was(controller, tmp_path):
     """The library creates a folder in the user's home, prints, and changes the timeout of every new socket."""
     program = (
         "import socket, sys\n"
-        "from rcilab.execution.session import connect\n"
+        "from rcilab.execution.connect import connect\n"
         f"with connect({controller.address!r}) as robot:\n"
         "    robot.state\n"
         "assert socket.getdefaulttimeout() is None\n"

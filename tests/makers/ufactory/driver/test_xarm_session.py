@@ -20,7 +20,7 @@ from rcilab.core.errors import (
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotMode
-from rcilab.execution.session import connect
+from rcilab.execution.connect import connect
 from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, SoftJointLimits
 from rcilab.makers.parameters import default_parameters
 from rcilab.makers.ufactory.driver.connection import Shown
