@@ -23,7 +23,7 @@ from rcilab.makers.ufactory.driver.address import parse_address
 from rcilab.makers.ufactory.driver.links import Endpoint, find_arm
 from rcilab.makers.ufactory.wire.frame import HEADER_SIZE, PRIVATE
 from rcilab.makers.ufactory.wire.functions import Function
-from rcilab.makers.ufactory.wire.reports import REPORTS, RICH, ReportLayout
+from rcilab.makers.ufactory.wire.reports import REPORTS, RICH
 from rcilab.realtime.scheduling import realtime_section
 
 _ROBOT = "xArm7"
