@@ -62,8 +62,8 @@ RECOVERY_TIME = 50  # [cycles] Shortest duration of an error recovery, so that i
 _NO_GENERATOR, _NO_CONTROLLER = 0, 3  # As in the state.
 _RESTING_LAWS = {Phase.USER_STOPPED: ControlLaw.BRAKED, Phase.GUIDING: ControlLaw.GUIDE}
 _MOVES_THE_TOOL = (SetNEToEE, SetLoad)
-_ROW_MAJOR = itemgetter(*(column * 4 + row for row in range(4) for column in range(4)))
 """Settings of tool and load, with which the arm begins again at its present angles."""
+_ROW_MAJOR = itemgetter(*(column * 4 + row for row in range(4) for column in range(4)))
 _STILL = (Phase.IDLE, Phase.REFLEX, Phase.USER_STOPPED)
 _USER_STOP = Remark("the user stop was pressed", "estop")
 
