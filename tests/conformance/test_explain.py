@@ -12,6 +12,7 @@ import pytest
 from rcilab.conformance.advice import advise
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, translate
 from rcilab.conformance.check import check
+from rcilab.conformance.common_conditions import condition_table
 from rcilab.conformance.explain import explain_formula, explain_source, explain_violation
 from rcilab.conformance.html import report_html
 from rcilab.conformance.report import Violation
@@ -28,6 +29,7 @@ from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import Motion, plan_joint
+from rcilab.robots import ROBOT_NAMES, describe_robot
 from tests.catalogues import require_equal
 
 MODEL = load_model("xMatePro7")
@@ -236,7 +238,8 @@ def test_a_language_that_nobody_speaks_here_is_refused():
 
 
 def test_every_source_is_told_in_both_languages():
-    for row in (*RCI_CONDITIONS.conditions, *FRANKA_CONDITIONS):
+    tables = [condition_table(describe_robot(name)) for name in ROBOT_NAMES]
+    for row in {row.source: row for table in tables for row in table.conditions}.values():
         assert explain_source(row) == row.source
         assert explain_source(row, "zh") != row.source
     own = replace(RCI_CONDITIONS.conditions[0], source="a page of somebody's own")
