@@ -106,11 +106,6 @@ class Maker(Protocol):
         ...
 
     @property
-    def interface(self) -> str:
-        """Name of its control interface in texts, such as "the RCI"."""
-        ...
-
-    @property
     def scheme(self) -> str:
         """URL scheme of its controllers, such as "rci" in rci://192.168.0.160:1337."""
         ...

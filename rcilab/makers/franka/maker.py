@@ -29,7 +29,6 @@ class Franka:
 
     name = "franka"
     title = "Franka"
-    interface = "Franka's own interface"
     scheme = "fci"
     robots = ROBOTS
     client_port = CLIENT_PORT

@@ -28,7 +28,6 @@ class RealMan:
 
     name = "realman"
     title = "RealMan"
-    interface = "RealMan's JSON interface"
     scheme = "realman"
     robots = ROBOTS
     client_port = None

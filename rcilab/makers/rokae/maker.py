@@ -29,7 +29,6 @@ class Rokae:
 
     name = "rokae"
     title = "ROKAE"
-    interface = "the RCI"
     scheme = "rci"
     client_port = None
     robots = ROBOTS

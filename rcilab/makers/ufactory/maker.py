@@ -35,7 +35,6 @@ class Ufactory:
 
     name = "ufactory"
     title = "UFACTORY"
-    interface = "the xArm interface"
     scheme = "xarm"
     robots = ROBOTS
     client_port = CLIENT_PORT
