@@ -72,12 +72,12 @@ class Served:
         wait_for(is_placed, what="the arm at standstill")
 
 
-def run_program(home: Path, name: str, *arguments: object) -> Any:
+def run_program(home: Path, name: str, *arguments: object, timeout: float = PATIENCE) -> Any:
     """Returns what a program prints; its errors are those of the test."""
     command = [sys.executable, "-m", "tests.makers.ufactory.clients.programs", name, *map(str, arguments)]
     environment = {**os.environ, "HOME": str(home)}
     found = subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=PATIENCE, check=False
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=timeout, check=False
     )
     assert found.returncode == 0, f"{name}:\n{found.stdout[-3000:]}\n{found.stderr[-3000:]}"
     assert "Traceback" not in found.stderr, found.stderr[-3000:]

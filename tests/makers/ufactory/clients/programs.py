@@ -15,6 +15,7 @@ from xarm.wrapper import XArmAPI
 
 Q6 = [0.2, -0.5, -0.8, 0.1, 1.1, 0.3]
 DOWN = [-180.0, 0.0, 0.0]
+SERVO_PERIOD = 0.004  # [s]
 
 
 def connect(host: str, **options: Any) -> Any:
@@ -165,6 +166,29 @@ def servo(host: str) -> object:
     stand(arm)
     after = arm.get_position()[1]
     return {"codes": sorted(set(codes)), "turned": turned, "moved": [after[1] - y, after[2] - z]}
+
+
+def swing(host: str, seconds: str) -> object:
+    """Streams a swing of every joint at 250 Hz, while reports come at their own rate."""
+    arm = connect(host, is_radian=True)
+    codes, sent, reports = set(ready(arm, 1)), 0, 0
+    start = arm.get_servo_angle()[1][:6]
+
+    def count(_: object) -> None:
+        nonlocal reports
+        reports += 1
+
+    arm.register_report_callback(count)
+    begin = time.monotonic()
+    while (now := time.monotonic() - begin) < float(seconds):
+        delta = 0.1 * (1.0 - math.cos(math.pi * now))
+        codes.add(arm.set_servo_angle_j([angle + delta for angle in start]))
+        sent += 1
+        time.sleep(max(0.0, begin + sent * SERVO_PERIOD - time.monotonic()))
+    codes.add(arm.set_servo_angle_j(start))
+    stand(arm)
+    end = arm.get_servo_angle()[1][:6]
+    return {"codes": sorted(codes), "sent": sent, "reports": reports, "start": start, "end": end}
 
 
 def reports(host: str, kind: str) -> object:
