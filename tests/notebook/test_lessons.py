@@ -115,8 +115,8 @@ def shown(notebook: nbformat.NotebookNode, kind: str) -> list[str]:
     ]
 
 
-def test_there_are_twelve_lessons_in_two_languages() -> None:
-    assert [path.name[:3] for path in LESSONS] == [f"{number:02}_" for number in range(1, 13)]
+def test_there_are_thirteen_lessons_in_two_languages() -> None:
+    assert [path.name[:3] for path in LESSONS] == [f"{number:02}_" for number in range(1, 14)]
     assert [path.name for path in CHINESE] == [path.name.replace(".ipynb", ".zh.ipynb") for path in LESSONS]
 
 
@@ -188,7 +188,7 @@ def test_the_sixth_lesson_shows_its_numbers_at_any_pace_and_again() -> None:
 
 
 @pytest.mark.skipif(sys.version_info >= (3, 13), reason="pylibfranka has no wheel for this Python")
-def test_the_last_two_lessons_move_an_arm_of_each_maker() -> None:
+def test_the_lessons_on_two_makers_move_an_arm_of_each() -> None:
     both, breaks = printed(run_lesson(LESSONS[10])), printed(run_lesson(LESSONS[11]))
     assert re.findall(r"^(\w+) +T = \d\.\d{3} s, max", both, re.MULTILINE) == ["xMatePro7", "Panda"]
     assert re.findall(r"^(\w+) +t = .*\['(\w+)'\]", both, re.MULTILINE) == [
@@ -203,7 +203,7 @@ def test_the_last_two_lessons_move_an_arm_of_each_maker() -> None:
     ]
 
 
-@pytest.mark.parametrize("path", LESSONS[10:], ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", LESSONS[10:12], ids=lambda path: path.stem)
 def test_a_lesson_on_two_makers_runs_without_the_libraries_of_franka(path: Path) -> None:
     import nbformat
 
