@@ -33,6 +33,7 @@ from rcilab.makers.parameters import default_parameters
 from rcilab.makers.scenario import FaultScenario, Scene
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import plan_joint, plan_recovery
+from rcilab.motion.joint import DEFAULT_JOINT_SPEED
 
 _CAPACITY = 4096  # [cycles] More than any scenario takes.
 _OPEN = SafetyBox(size=(20.0, 20.0, 20.0), T_base_box=IDENTITY, active=False)
@@ -41,6 +42,7 @@ _MAX_WAIT_STATES = 500
 _GAP = 5  # [states] Largest number of missing states between two shown ones, as on any network.
 _AFTER = 200  # [cycles] Recorded part of the controlled stop: the arm stands still by then.
 _TEST_MOTION = 0.02  # [rad] Length of the motion that shows that the arm can move again.
+_CLOCKED_SPEED = 0.2  # Of an arm that runs by the clock and catches up after a pause of the machine, faster still.
 _THERE = 1e-6  # [rad] Largest distance from the start of a scenario.
 _OPENED, _PLACED, _SHOWN = 0.4, 0.5, 0.8
 """Progress when the controller runs, when the arm is at the start, when the fault has come. About as measured."""
@@ -173,7 +175,8 @@ class FaultLab(Closeable):
 
     def _go(self, robot: RobotSession, goal: Array) -> None:
         """Moves the private arm: inside every limit, without a check for collisions, as there is nothing to hit."""
-        motion = plan_joint(self.model, robot.receive_state().q_c, goal)
+        speed = DEFAULT_JOINT_SPEED if timing_of(self.model).state_cycles == 1 else _CLOCKED_SPEED
+        motion = plan_joint(self.model, robot.receive_state().q_c, goal, speed=speed)
         robot.control(MotionStream(motion.q, "joint_position", self.model))
 
     def _widen(self, robot: RobotSession) -> None:

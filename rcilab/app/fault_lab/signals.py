@@ -86,11 +86,12 @@ class Signals:
     ) -> None:
         self._rows, self._model, self._limits, self._box, self._lost = rows, model, limits, box, lost
         self._closed_form = model.solver
+        self._table = condition_table(model.description)
         self._period = CYCLE_TIME * state_cycles(rows)
 
     def find(self, fault: FaultCode) -> FaultSignal | None:
         """Returns the signal that raised a fault: the one farthest beyond its bound in the last row."""
-        rows = condition_table(self._model.description).raising(fault)
+        rows = self._table.raising(fault)
         found = [signal for row in rows for signal in self._signals(row) if signal.is_broken]
         return max(found, key=lambda signal: signal.excess, default=None)
 
@@ -149,6 +150,8 @@ class Signals:
         if condition.signal == "position" and self._box is not None:
             path = self._model.forward_path(joints) if joints is not None else poses
             return None if path is None else self._box.excess_path(path[_BEFORE:, :3, 3])[:, None]
+        if joints is not None and condition.signal == "translation" and condition in self._table.motion:
+            return self._speed_of_joints(joints)
         if poses is None:
             return None
         if condition.signal == "frame":
@@ -162,6 +165,15 @@ class Signals:
         steps = rotation_steps(poses[:, :3, :3]) if is_turn else np.diff(poses[:, :3, 3], axis=0)
         rates = np.diff(steps, condition.order - 1, axis=0) / self._period**condition.order
         return np.linalg.norm(rates, axis=1)[_BEFORE - condition.order :, None]
+
+    def _speed_of_joints(self, joints: Array) -> Array:
+        """Returns the speed of the tool from one commanded row of angles to the next, (N, 1), [m/s].
+
+        A client that misses a state sends its next target later.
+        """
+        steps = np.linalg.norm(np.diff(self._model.position_path(joints), axis=0), axis=1)[_BEFORE - 1 :]
+        passed = np.diff(self._rows["message_id"].astype(np.int64))[:-1] * CYCLE_TIME
+        return (steps / np.concatenate((np.full(2, self._period), passed)))[:, None]
 
     def _joint_commands(self) -> Array | None:
         """Returns the joint angles of commands, also those that follow from poses; with rows as `_sent`."""
@@ -223,12 +235,17 @@ class Signals:
     def _external(self) -> Array:
         """Returns external joint torques, as the controller estimates them."""
         observer = MomentumObserver(self._model)
-        found: list[Array] = []
-        for index, row in enumerate(self._rows):
-            measured = Measurement(row["q"], row["dq"], row["tau"])
-            if index == 0:
-                observer.reset(measured)
-            found.append(observer.step(measured)[0])
+        before = self._rows[0]
+        estimate = observer.step(Measurement(before["q"], before["dq"], before["tau"]))[0]
+        found: list[Array] = [estimate]
+        for row in self._rows[1:]:
+            cycles = max(1, int(row["message_id"]) - int(before["message_id"]))
+            for cycle in range(1, cycles + 1):  # Those between two states are interpolated.
+                share = cycle / cycles
+                measured = (before[name] + share * (row[name] - before[name]) for name in ("q", "dq", "tau"))
+                estimate = observer.step(Measurement(*measured))[0]
+            found.append(estimate)
+            before = row
         return np.array(found)
 
     def _singularity(self, poses: Array) -> Array:

@@ -25,6 +25,9 @@ DEFAULT_JOINT_JERK: Final = 200.0  # [rad/s^3] User manual, 6.4.3 (11459 deg/s^3
 DEFAULT_TOOL_JERK: Final = 7.0  # [m/s^3]
 SENSITIVITIES: Final = (0, 5)
 """Range of the sensitivities to collisions and to hand guiding."""
+SENSITIVITY_STEP: Final = 0.2
+"""By which each step of the collision sensitivity lowers the thresholds, from the largest torques of the joints at 1 to
+a fifth at 5; rcilab's own values: the maker publishes no forces."""
 DEFAULT_SENSITIVITY: Final = 3  # Of both; rcilab's own value, the maker's is that of the last `save_conf`.
 
 LONGEST_TOOL: Final = 2.0  # [m] Distance of a frame, or of a centre of mass, from the flange; rcilab's own bound.

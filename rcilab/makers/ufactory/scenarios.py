@@ -1,7 +1,8 @@
 """The errors of UFACTORY's controllers that a session can provoke, each by the shortest stream that raises it.
 
-The client library refuses targets outside the joints' ranges, so that C23 has no scenario. The states have no external
-torques, by which a record would show C31.
+A session sends joint targets of mode 1. For these the client library refuses angles outside the joints' own ranges, so
+that C23 is that of narrower ranges; the controller solves no poses and keeps to the joints' speeds, so that C21, C24,
+C25 and C40 have no scenario. An emergency stop (C1, C2) has no condition that a record could show.
 """
 
 from __future__ import annotations
@@ -13,11 +14,13 @@ from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.command import JointPosition
+from rcilab.core.command import Command, JointPosition
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
 from rcilab.makers.scenario import Callback, FaultScenario, Scene
+from rcilab.makers.scenario_streams import PAUSE, joint_stream, path, rise
+from rcilab.makers.ufactory.bounds import SENSITIVITIES, SENSITIVITY_STEP, SERVO_SPEED_FACTOR
 from rcilab.makers.ufactory.errors import UfactoryError
 from rcilab.motion import plan_joint
 
@@ -31,6 +34,11 @@ _FOLDED = {
     "850": (0.0, -0.88, 0.0, 0.0, -1.65, 0.0),
 }
 """Inside every range, with the last link in the first or in the base, [rad]."""
+_NARROW = 0.05  # [rad] From the start of a joint to the end of its narrower range.
+_TOO_FAST = 1.8  # Of the largest speed of the tool in servo mode.
+_CHASE = 0.4  # [s] Of these targets.
+_FREE = 0.5  # [s] Of the motion until the push begins.
+_BLOW = 6.0  # Of the threshold of joint 1: at once, so that the record shows it, of which every fifth cycle is one.
 
 
 def _planned(scene: Scene, goal: ArrayLike, speed: float) -> Callback:
@@ -44,7 +52,7 @@ def _planned(scene: Scene, goal: ArrayLike, speed: float) -> Callback:
 
 
 def _fold(scene: Scene) -> Callback:
-    return _planned(scene, _FOLDED[scene.robot.model.name], 0.3)
+    return _planned(scene, _FOLDED[scene.robot.model.name], 0.15)
 
 
 def _bounded(scene: Scene) -> Scene:
@@ -57,6 +65,55 @@ def _leave(scene: Scene) -> Callback:
     return _planned(scene, scene.start.q_c + _AWAY * _joint_1(scene), 0.2)
 
 
+def _narrowed(scene: Scene) -> Scene:
+    joint = scene.robot.model.limits.joint
+    upper = np.array(joint.upper)
+    upper[-1] = scene.start.q_c[-1] + _NARROW
+    scene.commands.set_joint_ranges(joint.lower, upper)
+    return scene.narrowed(readonly_copy(upper))
+
+
+def _over_the_end(scene: Scene) -> Callback:
+    return joint_stream(scene.start.q_c, scene.robot.model.n - 1, path(rise(0.01, 0.2, 1200)))
+
+
+def _too_fast(scene: Scene) -> Callback:
+    """Targets that move at once with a speed that the arm reaches later, so that every one of them is too fast."""
+    start, joint = scene.start.q_c, scene.limits.joint
+    _, most, directions = np.linalg.svd(scene.robot.model.jacobian(start)[:3])  # The fastest tool for its joints.
+    inwards = np.copysign(1.0, directions[0] @ (joint.lower + joint.upper - 2.0 * start))
+    speed = _TOO_FAST * SERVO_SPEED_FACTOR * scene.limits.cartesian.translation_velocity / most[0]
+    dq = readonly_copy(inwards * speed * directions[0])
+
+    def callback(state: RobotState, t: float) -> JointPosition:
+        since = max(0.0, min(t, _CHASE) - PAUSE * CYCLE_TIME)
+        return JointPosition(readonly_copy(start + since * dq), finished=t > _CHASE)
+
+    return callback
+
+
+def _sensitive(scene: Scene) -> Scene:
+    most = SENSITIVITIES[1]
+    scene.commands.set_collision_sensitivity(most)
+    share = 1.0 - SENSITIVITY_STEP * (most - 1)
+    return scene.guarded(readonly_copy(share * scene.robot.model.limits.joint.torque))
+
+
+def _hit(scene: Scene) -> Callback:
+    """Pushes the tool back while it moves: the controller compares torques only then."""
+    move = _planned(scene, scene.start.q_c + _AWAY * _joint_1(scene), 0.1)
+    x, y, _ = scene.start.T_base_tool_c.position
+    force = _BLOW * scene.limits.joint.collision_threshold[0] / np.hypot(x, y)
+    pending = [(0.0, -force, 0.0, 0.0, 0.0, 0.0)]
+
+    def callback(state: RobotState, t: float) -> Command:
+        if pending and t > _FREE:
+            scene.robot.simulation.push(pending.pop(), rise_time=0.0)
+        return move(state, t)
+
+    return callback
+
+
 def _joint_1(scene: Scene) -> JointVector:
     return readonly_copy(np.eye(scene.robot.model.n)[0])
 
@@ -65,7 +122,17 @@ def scenarios_of(arm: str) -> tuple[FaultScenario, ...]:
     """Returns the scenarios of an arm, by its name, in display order."""
     return (
         FaultScenario(
+            fault=UfactoryError.JOINT_RANGE, group="position", mode="joint_position", prepare=_narrowed,
+            act=_over_the_end, is_commanded=True,
+        ),
+        FaultScenario(
             fault=UfactoryError.SAFETY_BOUNDARY, group="position", mode="joint_position", prepare=_bounded, act=_leave
         ),
         FaultScenario(fault=UfactoryError.SELF_COLLISION, group="position", mode="joint_position", act=_fold),
-    )
+        FaultScenario(
+            fault=UfactoryError.SERVO_LINEAR_SPEED, group="velocity", mode="joint_position", act=_too_fast
+        ),
+        FaultScenario(
+            fault=UfactoryError.COLLISION, group="contact", mode="joint_position", prepare=_sensitive, act=_hit
+        ),
+    )  # fmt: skip

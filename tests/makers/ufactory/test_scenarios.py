@@ -15,11 +15,23 @@ from tests.makers.ufactory.library import needs_library
 @needs_library
 def test_errors_come_with_their_reason_and_the_arm_moves_again():
     with FaultLab("xArm6") as lab:
-        for fault in (UfactoryError.SAFETY_BOUNDARY, UfactoryError.SELF_COLLISION):
+        assert [fault.manual_name for fault in lab.faults] == ["C23", "C35", "C22", "C60", "C31"]
+        for fault in lab.faults:
             demo = lab.provoke(fault)
             assert demo.reported == (fault,)
             assert demo.condition.fault is fault
-            assert demo.way_out == ("recover", "move")
+            assert demo.signal.is_broken
+            assert demo.describe("sent", "en") != demo.describe("sent", "zh")
+            assert demo.way_out[-2:] == ("recover", "move")
+
+
+@needs_library
+@pytest.mark.parametrize("name", sorted(set(ROBOTS) - {"xArm6"}))
+def test_a_tool_can_be_too_fast_on_every_arm(name):
+    with FaultLab(name) as lab:
+        demo = lab.provoke(UfactoryError.SERVO_LINEAR_SPEED)
+    assert demo.bound == pytest.approx(1.2 * load_model(name).limits.cartesian.translation_velocity)
+    assert demo.value > demo.bound
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -19,6 +19,7 @@ from rcilab.makers.ufactory.bounds import (
     JOINT_VELOCITY,
     LONGEST_TOOL,
     SENSITIVITIES,
+    SENSITIVITY_STEP,
     TOOL_ACCELERATION,
     TOOL_JERK,
 )
@@ -31,9 +32,6 @@ from rcilab.sim.arm_setup import ArmSetup
 
 WIDEST_BOUNDARY = (9999, -9999, 9999, -9999, 9999, -9999)  # [mm] As the client library has it before any report.
 TOOL_SPEED = 1.0  # [m/s] User manual, 10.
-_SENSITIVITY_STEP = 0.2
-"""By which each step of the collision sensitivity lowers the thresholds, from the largest torques of the joints at 1 to
-a fifth at 5; rcilab's own values: the maker publishes no forces."""
 
 RESETTING = frozenset(
     {
@@ -228,7 +226,7 @@ def _apply_safety(settings: Settings, function: Function, values: tuple[Any, ...
 def _with_thresholds(settings: Settings) -> Settings:
     """Returns the settings with the thresholds of their collision sensitivity."""
     steps = settings.collision_sensitivity - 1
-    share = inf if steps < 0 else 1.0 - _SENSITIVITY_STEP * steps
+    share = inf if steps < 0 else 1.0 - SENSITIVITY_STEP * steps
     return replace(settings, collision_thresholds=tuple(share * value for value in settings.largest_thresholds))
 
 
