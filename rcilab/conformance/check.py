@@ -163,7 +163,8 @@ def _check(
         rows = (*rows, *clearance_conditions(distance))
     if record is not None:
         is_missing = {"start": state.moving, "throughout": False, "end": record.was_stopped}
-        rows = tuple(row for row in rows if not is_missing[row.stage])
+        is_free = record.has_free_elbow and mode.startswith("cartesian")
+        rows = tuple(row for row in rows if not (is_missing[row.stage] or (is_free and row.signal == "arm_angle")))
     return _report(
         motion, rows, model=model, start=state, box=box, distance=distance, mode=mode, torques=torques, record=record
     )

@@ -48,6 +48,8 @@ class Record:
     reference: JointVector | None = None
     """Commanded joint angles before the first row, shape (n,), [rad], where the controller absorbed its distance from
     them: it is compared with them but not differentiated. None: the start of the check."""
+    has_free_elbow: bool = False
+    """Whether the controller left the arm angle free: it has no conditions, nor poses that are singular for it alone."""
 
 
 class MotionSignals:
@@ -116,8 +118,11 @@ class MotionSignals:
         if condition.signal in ("translation", "rotation", "arm_angle"):
             return self._tool.differences(condition.signal)[condition.order]
         if condition.signal == "frame":
-            closeness = self._tool.singularity
-            is_refused = self._record is not None and self._record.refused_pose
+            record = self._record
+            # With a free arm angle, a singular pose is one without joint angles: see `Record.refused_pose`.
+            is_free = record is not None and record.has_free_elbow
+            closeness = np.zeros((len(self._differences[0]), 1)) if is_free else self._tool.singularity
+            is_refused = record is not None and record.refused_pose
             return np.concatenate((closeness[: len(self._motion.q)], [[np.inf]])) if is_refused else closeness
         if condition.signal == "elbow_sign":
             return self._tool.elbow_side

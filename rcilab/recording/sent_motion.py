@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rcilab.conformance.advice import with_degrees
 from rcilab.conformance.check import check_commands, check_torques
-from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
+from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE, condition_table
 from rcilab.conformance.pose_validation import find_frame_error
 from rcilab.conformance.refusal import with_refusal
 from rcilab.conformance.signals import Record
@@ -25,7 +25,7 @@ from rcilab.core.errors import PlanningError, UsageError
 from rcilab.core.state import COMPLIANT_MODES, MODES, Mode, require_mode
 from rcilab.model.robot_model import require_model
 from rcilab.motion.differences import derivatives_from_differences
-from rcilab.motion.inverse_path import inverse_path
+from rcilab.motion.inverse_path import free_inverse_path, inverse_path
 from rcilab.motion.motion import Motion
 from rcilab.motion.stop import plan_stop
 from rcilab.recording.playout import played_commands, played_span
@@ -63,7 +63,8 @@ def sent_motion(run: Run) -> Motion:
     """Returns the motion that a client commanded: its commands in its own order, one a cycle.
 
     It has the joint angles as they were sent, or those of the poses that were sent, on the branch on which the arm
-    stood. Velocities and goals are not angles: for them it has the joint angles to which the controller integrated or
+    stood; where the controller leaves the arm angle free and none was sent, with the least motion of the joints.
+    Velocities and goals are not angles: for them it has the joint angles to which the controller integrated or
     planned them. What the arm did in a pause of the client is not the client's: a command that came late counts at its
     place, and one that did not arrive is interpolated; `.notes` counts these. Where a virtual controller recorded which
     commands it played, it begins with the first one played and ends with the last, or with one that was refused.
@@ -155,7 +156,11 @@ def _check(
         return _with_broken(report, model, "torque", not_finite)
     sent = read_sent(run)
     motion = sent.motion
-    record = Record(was_stopped=bool(run.stopped or run.faults or not run.is_complete), refused_pose=sent.was_refused)
+    record = Record(
+        was_stopped=bool(run.stopped or run.faults or not run.is_complete),
+        refused_pose=sent.was_refused,
+        has_free_elbow=_has_free_elbow(run, model),
+    )
 
     def check_from(
         motion: Motion, record: Record, start: JointVector | StartState | None, note: tuple[str, ...] = ()
@@ -262,6 +267,11 @@ def _with_broken(report: Report, model: RobotModel, signal: Signal, joint: int) 
     rows = (row.condition for row in report.rows if row.condition.signal == signal and row.fault is not None)
     condition = min(rows, key=lambda row: row.order)
     return with_refusal(report, condition, model.limits, report.motion.duration + CYCLE_TIME, joint=joint)
+
+
+def _has_free_elbow(run: Run, model: RobotModel) -> bool:
+    """Returns whether the arm angle was free in the whole run: not held by the controller, nor commanded."""
+    return condition_table(model.description).has_free_elbow and not np.isfinite(run.cycles["command_psi"]).any()
 
 
 def _is_first_refused(run: Run) -> bool:
@@ -467,9 +477,12 @@ def _angles_of_poses(run: Run, rows: NDArray[np.intp]) -> JointPath:
         if find_frame_error(pose.tolist()) is not None:
             T = T[:row]
             break
-    psi = _arm_angles(model, start, cycles["command_psi"][rows[: len(T)]].tolist()) if model.redundancy else None
     if not len(T):
         return T.reshape(0, model.n)
+    sent = cycles["command_psi"][rows[: len(T)]]
+    if model.redundancy and condition_table(model.description).has_free_elbow and not np.isfinite(sent).all():
+        return free_inverse_path(model, T, sent, start)
+    psi = _arm_angles(model, start, sent.tolist()) if model.redundancy else None
     q, end = inverse_path(model, T, psi, start)
     return q if end is None else q[: end.row]
 

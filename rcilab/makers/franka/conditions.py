@@ -283,6 +283,7 @@ FCI_CONDITIONS = ConditionTable(
     measured=tuple(row for row in _BEHAVIOUR if row.is_measured),
     box=_BOX,
     conditions=(*_MOTION, _BOX, *_TOOL, *_TORQUES, *_BEHAVIOUR),
+    has_free_elbow=True,
 )
 """The rows for `check` and the monitors of the Panda. Errors without a bound on the pages (power, sensor
 range) have no row."""
@@ -336,6 +337,7 @@ FR3_CONDITIONS = ConditionTable(
     measured=_fr3_rows(FCI_CONDITIONS.measured),
     box=_BOX,
     conditions=tuple(_FR3.values()),
+    has_free_elbow=True,
 )
 """The rows of the FR3."""
 

@@ -5,8 +5,8 @@ branch, then the soft-limit governor if enabled, and finally the conditions of t
 with the acceleration of the last poses, or holds the joint angles of the last one; then the filter takes the path over
 the pause once the next pose is there.
 
-The arm angle of a 7-axis arm is the commanded one if it is valid. Otherwise it is held: from the start of the motion,
-or from the last command with one. The vendor's client cannot command an arm angle of exactly zero (it is sent as "not
+The arm angle of a 7-axis arm is the commanded one if it is valid. Otherwise it is free, where the maker leaves it so, or
+held: from the start of the motion, or from the last command with one. The vendor's client cannot command an arm angle of exactly zero (it is sent as "not
 valid"); therefore an arm angle that is not valid counts as zero while the arm angle passes zero.
 """
 
@@ -43,7 +43,7 @@ class CartesianGenerator:
         self._has_begun = False
         self._reference = reference = PoseReference(bounds, q)
         self._psi = reference.psi
-        self._is_free = bounds.mode.has_free_elbow
+        self._is_free = self._has_free_elbow = bounds.has_free_elbow
         limits = bounds.limits.arm_angle
         self._had_psi = False  # Whether this motion's commands have had an arm angle.
         self._smallest_psi = 2.0 * CYCLE_TIME * limits.velocity if limits is not None else 0.0
@@ -86,7 +86,7 @@ class CartesianGenerator:
         between = self._end_pause(values, cycles)
         self._stream.take(values)
         if command is not None:
-            self._is_free = self._bounds.mode.has_free_elbow and not command.has_psi
+            self._is_free = self._has_free_elbow and not command.has_psi
         self._psi = remainder(values[7], tau) if command is None or is_lost else self._arm_angle(command)
         self._had_psi |= command is not None and command.has_psi
         try:

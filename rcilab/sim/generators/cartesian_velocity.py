@@ -38,7 +38,7 @@ class CartesianVelocityGenerator:
     def __init__(self, bounds: MotionLimits, q: list[float]) -> None:
         self._reference = reference = PoseReference(bounds, q)
         self._pose = reference.pose
-        self._is_free = self._has_free_elbow = bounds.mode.has_free_elbow
+        self._is_free = self._has_free_elbow = bounds.has_free_elbow
         self._stream = RateExtrapolator(6)
         self._filter = LowPass(bounds.parameters.twist_filter, [0.0] * 6)
         self._psi = CommandExtrapolator([reference.psi])

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import NamedTuple
 
-from rcilab.conformance.common_conditions import TOOL_CONDITIONS
+from rcilab.conformance.common_conditions import TOOL_CONDITIONS, condition_table
 from rcilab.core.arrays import JointVector
 from rcilab.core.condition import Condition
 from rcilab.core.limits import Limits
@@ -43,8 +43,6 @@ class MotionMode(NamedTuple):
 
     law: ControlLaw
     kind: CommandKind
-    has_free_elbow: bool = False
-    """Whether, without a commanded arm angle, the joints move least; otherwise the arm angle is held."""
     goal_velocity: tuple[float, ...] = ()
     """For JOINT_GOALS: the largest joint velocities, n numbers, [rad/s]; the limits apply where they are smaller."""
 
@@ -92,10 +90,15 @@ class MotionLimits:
     servos: tuple[ServoFigures, ...] | None
     """The servos that respond to a held command, one per joint; None: lost commands are bridged instead."""
 
+    @property
+    def has_free_elbow(self) -> bool:
+        """Whether poses without an arm angle leave it free: the joints then move least. Otherwise it is held."""
+        return condition_table(self.model.description).has_free_elbow
+
     def tool_conditions(self) -> tuple[Condition, ...]:
         """Returns `TOOL_CONDITIONS` with the maker's range of the arm angle, which may be that of a joint."""
-        table = self.model.description.conditions
-        ranges = [row.bounds for row in table().conditions if _is_arm_angle_range(row)] if table is not None else []
+        table = condition_table(self.model.description)
+        ranges = [row.bounds for row in table.conditions if _is_arm_angle_range(row)]
         if not ranges:
             return TOOL_CONDITIONS
         return tuple(replace(row, bounds=ranges[0]) if _is_arm_angle_range(row) else row for row in TOOL_CONDITIONS)

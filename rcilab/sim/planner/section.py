@@ -15,7 +15,7 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.motion.blend import Blend
 from rcilab.motion.hermite import DIFFERENCE_STEP, State, central_state
 from rcilab.motion.path import Path, build_line
-from rcilab.sim.generators.ik_tracker import IkTracker
+from rcilab.motion.ik_tracker import IkTracker
 from rcilab.sim.planner.guide import Guide
 
 _LENGTH_STEP = 0.01  # [m] Between the samples of a path of the tool; a tuning value.

@@ -83,5 +83,5 @@ def motion_of(request: Move, version: FciVersion, settings: Settings, *, follows
         law = ControlLaw.POSITION if is_stiff and follows_exactly else ControlLaw.JOINT_IMPEDANCE
     elif controller is MoveController.CARTESIAN_IMPEDANCE:
         law = ControlLaw.CARTESIAN_IMPEDANCE
-    mode = MotionMode(law, kind, has_free_elbow=True, goal_velocity=velocity)
+    mode = MotionMode(law, kind, goal_velocity=velocity)
     return MotionKind(controller, generator, mode, is_stiff)

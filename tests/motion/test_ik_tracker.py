@@ -12,7 +12,7 @@ from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.solvers.spherical.inverse import build_geometry
 from rcilab.model.kinematics.solvers.spherical.singularity import find_singularity
 from rcilab.model.robot_model import load_model
-from rcilab.sim.generators.ik_tracker import IkTracker
+from rcilab.motion.ik_tracker import IkTracker
 
 NAMES = ["xMatePro3", "xMatePro7", "xMate3", "xMate7"]
 TOOL = Pose([0.1, 0.0, 0.2], [0.9, 0.1, 0.0, 0.2])
