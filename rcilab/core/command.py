@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 from rcilab.core.arrays import JointVector, Matrix
 from rcilab.core.spatial import Pose
@@ -48,3 +48,15 @@ class JointTorque:
 
 
 Command: TypeAlias = JointPosition | CartesianPosition | JointTorque
+
+
+class CommandFilter(Protocol):
+    """A filter of a callback's commands. Owned by the control loop."""
+
+    def begin(self, command: Command) -> None:
+        """Starts at standstill at the first command of a motion."""
+        ...
+
+    def step(self, command: Command) -> Command:
+        """Returns the filtered command; called once per cycle."""
+        ...

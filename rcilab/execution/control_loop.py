@@ -12,7 +12,7 @@ import numpy as np
 
 from rcilab.core.arrays import JointVector
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.core.command import CartesianPosition, Command, CommandFilter, JointPosition, JointTorque
 from rcilab.core.errors import (
     CommandRejectedError,
     ConnectionLostError,
@@ -26,7 +26,7 @@ from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, RobotMode, RobotState
 from rcilab.execution.call_times import CallTimes
 from rcilab.execution.command_validation import describe_distance, distance_to, require_command, require_start
-from rcilab.execution.filters import CommandFilter, is_near
+from rcilab.execution.filters import is_near
 from rcilab.execution.interrupts import DeferredInterrupts
 from rcilab.execution.recorder import CycleLog
 from rcilab.execution.stop_planner import CartesianStopPlanner, JointStopPlanner, StopPlanner, TorqueStopPlanner

@@ -1,27 +1,25 @@
 """Filters of a callback's commands: a low pass, and a limiter of velocity, acceleration and jerk.
 
-The vendor's client always filters commands at 100 Hz and ends a motion before the filter has settled. Here both filters
-are options of `RobotSession.control`, and a motion ends when the sent command has reached the last one.
+ROKAE's client always filters commands at 100 Hz and ends a motion before the filter has settled. Here both filters are
+options of `RobotSession.control`, and a motion ends when the sent command has reached the last one. A driver may have
+those of its maker's client library instead (`StreamingDriver.open_filter`).
 """
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from rcilab.core.arrays import Array, as_number
+from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
-from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
-from rcilab.core.rotation import as_rotation9, rotation_matrix, rotation_vector
+from rcilab.core.rotation import rotation_matrix, rotation_vector
 from rcilab.motion import LIMIT_MARGIN
 from rcilab.motion.end_velocity import followable_bounds
-from rcilab.motion.path import slerp
+from rcilab.motion.low_pass import low_pass, low_pass_pose, smoothing
 
-FILTER_OFF = 1000.0  # [Hz] Cut-off frequency from which on nothing is filtered: the rate of the commands.
 _CATCH_UP = 300.0  # [1/s] Largest rate at which a lag decays: about three cycles, slower than the 1 kHz sampling.
 _BRAKING = 0.7  # Part of the acceleration used for braking: the rest covers the delay of a limited jerk. Tuning value.
 _LOOKAHEAD = (
@@ -31,37 +29,6 @@ _HALVINGS = 16  # Steps of a search: 1/65536 of the acceleration.
 _ROUNDING = 1.0 + 1e-6
 _NEAR = 1e-7  # [rad, m or N m] In one cycle that is a jerk of 100 units/s^3.
 _ARRIVED = 1e-12  # [rad or m] Rounding.
-
-
-def smoothing(cut_off: float, period: int = 1) -> float:
-    """Returns k of the first-order filter x += k (u - x): dt / (dt + 1 / (2 pi f)); 1 at 1000 Hz and above.
-
-    Args:
-        cut_off: f, [Hz].
-        period: dt, [cycles].
-
-    Raises:
-        InvalidValueError: It is not above 0.
-    """
-    frequency = as_number(cut_off, "cut_off", "Hz")
-    if not frequency > 0.0:
-        raise InvalidValueError("cut_off", cut_off, f"must be above 0 [Hz]; {FILTER_OFF:g} switches the filter off")
-    return (
-        1.0 if frequency >= FILTER_OFF else period * CYCLE_TIME / (period * CYCLE_TIME + 1.0 / (math.tau * frequency))
-    )
-
-
-def low_pass(u: Array, x: Array, k: float) -> Array:
-    """Returns the filter's next value from the command u and its last value x."""
-    return x + k * (u - x)
-
-
-def low_pass_pose(u: Array, x: Array, k: float) -> Array:
-    """Returns the next pose from the commanded pose u and the last one x, (4, 4): the rotation in the same ratio."""
-    T = u.copy()
-    T[:3, 3] = low_pass(u[:3, 3], x[:3, 3], k)
-    T[:3, :3] = np.array(slerp(as_rotation9(x[:3, :3]), as_rotation9(u[:3, :3]), k)).reshape(3, 3)
-    return T
 
 
 class Bounds(NamedTuple):
@@ -132,18 +99,6 @@ def limit_vector_rate(lag: Array, command_velocity: Array, last: SignalState, bo
                 high = middle
     acceleration = ease + low * (goal - ease)
     return SignalState(last.velocity + acceleration * CYCLE_TIME, acceleration)
-
-
-class CommandFilter(Protocol):
-    """A filter of a callback's commands. Owned by the control loop."""
-
-    def begin(self, command: Command) -> None:
-        """Starts at standstill at the first command of a motion."""
-        ...
-
-    def step(self, command: Command) -> Command:
-        """Returns the filtered command; called once per cycle."""
-        ...
 
 
 class LowPass:

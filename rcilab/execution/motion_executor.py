@@ -25,12 +25,12 @@ import numpy as np
 
 from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.core.command import CartesianPosition, Command, CommandFilter, JointPosition, JointTorque
 from rcilab.core.errors import KinematicsError
 from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, Mode, RobotState
 from rcilab.execution.control_loop import STATE_TIMEOUT, Callback, ControlLoop, StopCheck
-from rcilab.execution.filters import CommandFilter, RateLimiter
+from rcilab.execution.filters import RateLimiter
 from rcilab.execution.recorder import CycleLog
 from rcilab.makers.driver import StreamingDriver
 from rcilab.motion import plan_stop

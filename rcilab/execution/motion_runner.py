@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.command import CartesianPosition
+from rcilab.core.command import CartesianPosition, CommandFilter
 from rcilab.core.cycle_recorder import RECORD_TIME, Recorder
 from rcilab.core.errors import RecordedError
 from rcilab.core.state import Mode, RobotState
 from rcilab.execution.control_loop import Callback
-from rcilab.execution.filters import CommandFilter
 from rcilab.execution.motion_executor import MotionExecutor
 from rcilab.execution.recorder import CycleLog
 from rcilab.execution.session_lock import SessionLock

@@ -15,13 +15,14 @@ from rcilab.conformance.speed_scaling_check import plan_start_with_override
 from rcilab.core.arrays import JointVector, as_number, described
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.closeable import Closeable
+from rcilab.core.command import CommandFilter
 from rcilab.core.errors import ConnectionLostError, InvalidValueError, UsageError
 from rcilab.core.safety_box import SafetyBox, require_box
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.core.state import Mode, RobotState, require_mode
 from rcilab.execution.command_validation import find_start_mismatch
 from rcilab.execution.control_loop import Callback
-from rcilab.execution.filters import CommandFilter, LowPass, RateLimiter
+from rcilab.execution.filters import LowPass, RateLimiter
 from rcilab.execution.motion_executor import MotionStream
 from rcilab.execution.motion_runner import (
     MotionProgress,
@@ -433,11 +434,14 @@ class RobotSession(Closeable):
         Args:
             callback: `(state, t) -> JointPosition | CartesianPosition | JointTorque`, depending on the mode.
             mode: Command mode.
-            cut_off: Cut-off frequency of a low-pass filter of the commands, [Hz]; the vendor's client uses 100. None:
-                no filter.
-            rate_limit: Keeps the commands inside the limits of velocity, acceleration, jerk or torque rate: those of
-                the manual, or "sdk", the Cartesian limits of the vendor's limiter. Poses keep the tool's limits, which
-                may not be enough for the joints. None: no limiter.
+            cut_off: Cut-off frequency of a low-pass filter of the commands, [Hz]; the clients of ROKAE and Franka use
+                100. None: no filter.
+            rate_limit: Keeps the commands inside the limits of velocity, acceleration, jerk or torque rate. "manual":
+                those of the manual; after a jump the commands brake ahead of it. "sdk": on an xMate the same limiter
+                with the Cartesian limits of the vendor's; on a Franka arm libfranka's own limiter with its bounds,
+                which clips, so that a jump is overshot and swings for long, without a low pass for ever. (libfranka
+                has it on by default up to 0.9, and off from 0.10 on.) Poses keep the tool's limits, which may not be
+                enough for the joints. None: no limiter.
 
         Raises:
             ControlError: The controller stopped the motion; see `.faults` and `.run`, and call `recover()`.
@@ -447,13 +451,21 @@ class RobotSession(Closeable):
         """
         require_feature(require_feature(self.model, "streaming"), require_mode(mode))
         period = timing_of(self.model).command_cycles
-        filters: list[CommandFilter] = [] if cut_off is None else [LowPass(cut_off, period)]
-        if rate_limit is not None:
-            filters.append(RateLimiter(self._driver.select_limits(self.model.limits, rate_limit), period))
+        filters = self._open_filters(cut_off, rate_limit, period)
         if not callable(callback):
             raise InvalidValueError("callback", described(callback), "must be a function (state, t) -> command")
         with self._lock.begin_motion("control"):
             return self._runner.run(callback, mode, filters=filters)
+
+    def _open_filters(self, cut_off: float | None, rate_limit: str | None, period: int) -> list[CommandFilter]:
+        limits = self.model.limits
+        own = None if rate_limit is None else self._driver.open_filter(limits, rate_limit, cut_off)
+        if own is not None:
+            return [own]
+        filters: list[CommandFilter] = [] if cut_off is None else [LowPass(cut_off, period)]
+        if rate_limit is not None:
+            filters.append(RateLimiter(self._driver.select_limits(limits, rate_limit), period))
+        return filters
 
     def move_j(self, goal: ArrayLike, speed: float = DEFAULT_SPEED, progress: Progress | None = None) -> Run:
         """Moves to joint angles by the manual's S profile and returns at the end: the vendor's MOVEJ.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rcilab.core.arrays import JointVector, described
-from rcilab.core.command import Command
+from rcilab.core.command import Command, CommandFilter
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
@@ -278,6 +278,16 @@ class StreamingDriver(Driver, Protocol):
 
     def select_limits(self, limits: Limits, table: str) -> Limits:
         """Returns the limits with the tool's bounds of a table: "manual", or another that the maker publishes."""
+        ...
+
+    def open_filter(self, limits: Limits, table: str, cut_off: float | None) -> CommandFilter | None:
+        """Returns low pass and rate limiter of the maker's client library for a table; None: rcilab's apply to it.
+
+        Args:
+            limits: The arm's.
+            table: See `select_limits`.
+            cut_off: Cut-off frequency of the low pass, [Hz]; None: no low pass.
+        """
         ...
 
     def describe_faults(

@@ -16,12 +16,13 @@ from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.command import CartesianPosition, JointPosition, JointTorque
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
-from rcilab.execution.filters import LowPass, RateLimiter, is_near, low_pass, smoothing
+from rcilab.execution.filters import LowPass, RateLimiter, is_near
 from rcilab.makers.rokae.conditions import rci_faults
 from rcilab.makers.rokae.limit_tables import cartesian_limits
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
 from rcilab.motion.cartesian import schedule
+from rcilab.motion.low_pass import low_pass, smoothing
 from rcilab.motion.path import build_line
 
 MODEL = load_model("xMatePro7")

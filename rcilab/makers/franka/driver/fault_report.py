@@ -45,7 +45,7 @@ _ADVICE = {
 }
 _SMOOTHNESS = (
     "check that the commands are continuous up to their acceleration and inside the limits; otherwise lower the speed, "
-    "or filter them: control(callback, rate_limit='sdk', cut_off=100)"
+    "or filter them: control(callback, rate_limit='manual', cut_off=100)"
 )
 
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rcilab.core.command import Command
+from rcilab.core.command import Command, CommandFilter
 from rcilab.core.errors import CommandRejectedError, InvalidValueError, ModelError
 from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
@@ -20,11 +20,12 @@ from rcilab.makers.franka.driver.configuration import send_configuration
 from rcilab.makers.franka.driver.fault_report import describe_faults
 from rcilab.makers.franka.driver.handshake import find_version
 from rcilab.makers.franka.driver.libraries import arm_of, load_client_library, version_of
+from rcilab.makers.franka.driver.rate_limiter import LOST_CYCLES, LibfrankaFilter
 from rcilab.makers.franka.driver.session_commands import FciSessionCommands
 from rcilab.makers.franka.driver.settings import FciSettings, find_reason, refusal_of
 from rcilab.makers.franka.driver.state_reader import StateReader
 from rcilab.makers.franka.errors import FrankaError
-from rcilab.makers.franka.limit_tables import cartesian_limits
+from rcilab.makers.franka.limit_tables import cartesian_limits, require_table
 from rcilab.makers.known_setup import with_reported_load, with_reported_tool
 from rcilab.model.dynamics.payload import Payload, combine_payloads
 
@@ -256,5 +257,11 @@ class FciDriver:
     def select_limits(self, limits: Limits, table: str) -> Limits:
         """Returns the limits with the tool's bounds of the page ("manual"), or of the client library ("sdk")."""
         return cartesian_limits(limits, table)
+
+    def open_filter(self, limits: Limits, table: str, cut_off: float | None) -> CommandFilter | None:
+        """Returns libfranka's filters for "sdk"."""
+        if require_table(table) != "sdk":
+            return None
+        return LibfrankaFilter(limits, LOST_CYCLES[version_of(self.arm_name)], cut_off)
 
     describe_faults = staticmethod(describe_faults)

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rcilab.core.command import Command
+from rcilab.core.command import Command, CommandFilter
 from rcilab.core.errors import DeadlineError, InvalidValueError, RcilabError
 from rcilab.core.fault import name_faults
 from rcilab.core.limits import Limits
@@ -239,6 +239,10 @@ class RciDriver:
     def select_limits(self, limits: Limits, table: str) -> Limits:
         """Returns the limits with the tool's bounds of the manual, or of the vendor's limiter ("sdk")."""
         return cartesian_limits(limits, table)
+
+    def open_filter(self, limits: Limits, table: str, cut_off: float | None) -> CommandFilter | None:
+        """Returns None: rcilab's filters apply."""
+        return None
 
     describe_faults = staticmethod(describe_faults)
 

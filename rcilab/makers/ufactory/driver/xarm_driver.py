@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rcilab.core.command import Command, JointPosition
+from rcilab.core.command import Command, CommandFilter, JointPosition
 from rcilab.core.errors import DeadlineError, InvalidValueError, ModelError
 from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, RobotMode, RobotState
@@ -256,5 +256,9 @@ class XArmDriver:
         if table != "manual":
             raise InvalidValueError("rate_limit", table, "does not exist for this maker; there is 'manual'")
         return limits
+
+    def open_filter(self, limits: Limits, table: str, cut_off: float | None) -> CommandFilter | None:
+        """Returns None: rcilab's filters apply."""
+        return None
 
     describe_faults = staticmethod(describe_faults)

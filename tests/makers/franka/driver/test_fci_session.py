@@ -130,11 +130,12 @@ def test_steps_are_smoothed_by_the_filters_of_the_client_library(robot):
     q0 = robot.state.q_c
 
     def step(state, t):
-        return JointPosition(q0 + (0.05 if t > 0.1 else 0.0), finished=t > 0.5)
+        return JointPosition(q0 + (0.005 if t > 0.1 else 0.0), finished=t > 0.9)
 
     run = robot.control(step, cut_off=100.0, rate_limit="sdk")
     assert run.faults == ()
-    assert np.abs(robot.state.q_c - q0 - 0.05).max() <= 1e-5
+    assert np.abs(robot.state.q_c - q0 - 0.005).max() <= 1e-5
+    assert run.cycles["q_c"].max(axis=0) == pytest.approx(q0 + 0.009, abs=6e-4)  # It clips, so it overshoots.
 
 
 def test_a_stop_is_within_the_limits_and_the_arm_is_ready_again(robot):
