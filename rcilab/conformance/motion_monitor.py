@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,12 @@ from numpy.typing import ArrayLike
 from rcilab.conformance.box_monitor import BoxMonitor
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
 from rcilab.conformance.clearance_monitor import ClearanceMonitor
-from rcilab.conformance.common_conditions import condition_table
+from rcilab.conformance.common_conditions import (
+    MOTION_TORQUE_CONDITIONS,
+    TOOL_CONDITIONS,
+    TORQUE_CONDITIONS,
+    condition_table,
+)
 from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.measured_monitor import MeasuredMonitor
@@ -23,6 +28,7 @@ from rcilab.conformance.tool_signals import commands_before
 from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.arrays import Array, JointVector, as_vector, described
 from rcilab.core.clearance import ClearanceLimit
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
@@ -66,7 +72,8 @@ class Monitor:
         self._start_rows = [row for row in rows if row.stage == "start" and row.order == 0]
         self._clearance = None if distance is None else ClearanceMonitor(model, distance)
         self._torques = None
-        torques = TorqueMonitor(limits.joint, sorted(_throughout(rows, "torque"), key=lambda row: -row.order))
+        order = TORQUE_CONDITIONS if self.mode == "torque" else reversed(MOTION_TORQUE_CONDITIONS)
+        torques = TorqueMonitor(limits.joint, _in_order(rows, order))
         if self.mode == "torque":
             self._torques = torques
         else:
@@ -76,7 +83,9 @@ class Monitor:
             )
         self._is_cartesian = self.mode.startswith("cartesian")
         if self._is_cartesian:
-            self._tool_rows = (table.box, *_throughout(table.cartesian, "arm_angle", "translation", "rotation"))
+            self._tool_rows = _in_order((table.box, *table.cartesian), TOOL_CONDITIONS)
+        else:
+            self._speed_row = next((row for row in _throughout(rows, "translation") if row.order == 1), None)
         self._box_row = table.box
         self._pose_rows = {row.signal: row for row in rows if row.signal in ("frame", "elbow_sign")}
         self._inverse = model.solver
@@ -98,6 +107,7 @@ class Monitor:
         state = as_start(start, model.n)
         self._start, self._is_first = state, not state.moving
         self._q = state.q.tolist()
+        self._position = model.forward(state.q).parts[1]
         self._build_monitors(state.q)
         self._measured.reset(state.q.tolist())
         tau = model.rigid_body.motion_torque(state.q, state.dq, state.ddq).tolist() if state.moving else [0.0] * model.n
@@ -177,12 +187,12 @@ class Monitor:
     def _step_torques(self, monitor: TorqueMonitor, command: Command, cycles: int) -> list[LimitViolation]:
         tau = self._numbers(command.tau if isinstance(command, JointTorque) else None, "tau", command)
         monitor.step(tau, cycles)
-        return self._check_start({"torque": tau}) + monitor.violations()
+        return self._check_start({"torque": tau}) + self._with_own_rows(monitor.violations())
 
     def _step_joints(self, command: Command, cycles: int) -> list[LimitViolation]:
         q = self._numbers(command.q if isinstance(command, JointPosition) else None, "q", command)
         offset = [new - old for new, old in zip(q, self._start.q.tolist(), strict=True)]
-        found = self._check_start({"joint": offset}) + self._check_joints(q, cycles)
+        found = self._check_start({"joint": offset}) + self._check_joints(q, cycles) + self._check_speed(q, cycles)
         return found + self._standstill.step(self._last_difference, cycles, is_last=command.finished)
 
     def _step_pose(
@@ -200,7 +210,7 @@ class Monitor:
         distance = math.dist(pose.parts[1], self._start_pose.parts[1])
         turn = 0.0 if self._psi is None else self._psi - (self._start_psi or 0.0)
         found = self._check_start({"translation": [distance], "arm_angle": [math.remainder(turn, math.tau)]})
-        found += monitor.violations()
+        found += self._with_own_rows(monitor.violations())
         flange = pose @ self._T_tool_flange if self._has_tool else pose
         q = self._inverse.solve_near(flange, self._psi or 0.0, self._joints_on_side(side))
         if q is None:
@@ -221,11 +231,23 @@ class Monitor:
         self._motion_torques.step(
             self._model.rigid_body.motion_torque(*map(np.array, (q, state.dq, state.ddq))).tolist(), cycles
         )
-        found += self._motion_torques.violations()
+        found += self._with_own_rows(self._motion_torques.violations())
         if self._box.is_active:
             self._box.step(self._model.forward(q).parts[1])
             found += self._box.violations()
         return found + self._check_clearance(q)
+
+    def _check_speed(self, q: list[float], cycles: int) -> list[LimitViolation]:
+        """Returns the violation of the bound on the tool's velocity in joint motions, where there is one."""
+        row = self._speed_row
+        if row is None or not math.isfinite(sum(q)):
+            return []
+        before, self._position = self._position, self._model.forward(q).parts[1]
+        speed, bound = (
+            math.dist(before, self._position) / (cycles * CYCLE_TIME),
+            float(row.bounds(self._model.limits)[1][0]),
+        )
+        return [] if speed < bound else [LimitViolation(row, 0, speed, bound)]
 
     def _last_difference(self, row: Condition) -> Sequence[float]:
         """Returns the last velocities or accelerations for a row, of the joints or as a norm of the tool."""
@@ -295,6 +317,12 @@ class Monitor:
     def _kind_error(self, command: object) -> InvalidValueError:
         kind = "JointTorque" if self._torques is not None else "CartesianPosition" if self._tool else "JointPosition"
         return InvalidValueError("command", described(command), f"must be a {kind} in the mode {self.mode}")
+
+
+def _in_order(rows: Iterable[Condition], order: Iterable[Condition]) -> list[Condition]:
+    """Returns common rows in their order, those of the arm's table in place of them."""
+    own = {row.id: row for row in rows}
+    return [own.get(row.id, row) for row in order]
 
 
 def _throughout(rows: Sequence[Condition], *signals: str) -> list[Condition]:

@@ -28,6 +28,9 @@ HOLD_SAMPLES = 3
 _SMOOTH_RATE = 0.03
 """Part of the torque rate limits, as inertia times jerk, below which torques change smoothly, at speeds within the
 limits. The jerk alone is no measure: with a load of 5 kg, 1 % of its limit takes up to a quarter of the torque rate."""
+_TORQUE_TIME = 0.05  # [s]
+"""In which the largest torque builds up at the largest rate, for an arm without a bound on the rate; 0.03 to 0.09 s for
+the arms with one."""
 _SMOOTH_STEP = 16
 """[cycles] Spacing of computed torques where they change smoothly; between them they are interpolated linearly,
 accurate to 2 % of the bounds (tests/conformance/test_signals.py)."""
@@ -188,7 +191,8 @@ class MotionSignals:
         joint, smooth = self._model.limits.joint, 0.0 if self._mode == "torque" else _SMOOTH_RATE
         poses = q[:: max(len(q) // 2, 1)]  # Start, middle and end; the greatest inertia counts.
         inertia = np.max([np.abs(self._model.rigid_body.mass_matrix(pose)) for pose in poses], axis=0)
-        weights = (inertia / joint.torque_rate[:, None]).max(axis=0)  # Of a joint's jerk, in the rate of any joint.
+        rates = np.where(np.isfinite(joint.torque_rate), joint.torque_rate, joint.torque / _TORQUE_TIME)
+        weights = (inertia / rates[:, None]).max(axis=0)  # Of a joint's jerk, in the rate of any joint.
         change = np.einsum("j,jn->n", weights, np.abs(jerk.T))  # Not by BLAS, whose threads take longer to start.
         chosen = _rows_to_compute((change > smooth) | (np.abs(dq) > joint.velocity).any(axis=1))
         tau, rate = self._torques_at(chosen)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 from types import MappingProxyType
 from typing import Literal
 
@@ -153,6 +154,8 @@ class Limits:
     cartesian: CartesianLimits
     arm_angle: ArmAngleLimits | None
     """None for an arm without a redundant joint."""
+    joint_tool_velocity: float = inf
+    """Of the tool in motions that are commanded in joint angles, [m/s]; infinite where the interface has no bound."""
     sources: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     """Source of each limit, by dotted name."""
 

@@ -176,6 +176,7 @@ class Stepper:
         """Advances one cycle; if ruckig finds no curve, every axis brakes in this cycle."""
         if not self._update():
             self._set_velocity_target(self._standstill)
+            self._ruckig.reset()  # Otherwise it may continue its last curve from the state after that.
             if not self._update():
                 raise PlanningError(
                     "no stop exists from this state; its velocities or accelerations are far beyond any robot's"

@@ -11,8 +11,10 @@ from rcilab.core.arrays import Array, JointPath, JointVector, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import PlanningError
 from rcilab.core.limits import SMALLEST_END_VELOCITY, JointLimits
+from rcilab.model.robot_model import RobotModel
 from rcilab.motion.bounds import LIMIT_MARGIN, angle_text
 from rcilab.motion.piecewise import PiecewisePolynomial
+from rcilab.motion.tool_velocity import tool_excess
 
 _LOWEST_PART = 0.02
 """A slower motion is refused. Tuning value: it would last fifty times as long."""
@@ -71,23 +73,31 @@ def require_approachable(limits: JointLimits, start: JointVector, goal: JointVec
         raise blocked[1]
 
 
-def plan_within_end_velocity(limits: JointLimits, plan: Callable[[float], PiecewisePolynomial]) -> PiecewisePolynomial:
-    """Returns the fastest curve that keeps the velocity bounds near the ends of the ranges.
+def plan_within_velocity(
+    limits: JointLimits, plan: Callable[[float], PiecewisePolynomial], model: RobotModel | None
+) -> PiecewisePolynomial:
+    """Returns the fastest curve that keeps the velocity bounds near the ends of the ranges, and that of the tool.
 
     Args:
         limits: Limits of the joints.
         plan: Plans with a part of the speed, above 0, to 1.
+        model: The arm, with its tool, if `Limits.joint_tool_velocity` bounds it; else None.
 
     Raises:
         PlanningError: No speed keeps them.
     """
     curve = plan(1.0)
-    if limits.near_ends is None:
+    if limits.near_ends is None and model is None:
         return curve
     low = high = 1.0
-    while (excess := _worst_excess(limits, curve)) > 1.0:
+    while (excess := _worst_excess(limits, model, curve)) > 1.0:
         high, low = low, low / max(excess, _LEAST_STEP)
         if low < _LOWEST_PART:
+            if model is not None:
+                raise PlanningError(
+                    "the tool starts faster than motions in joint angles may move it; stop first and plan from "
+                    "standstill"
+                ).coded("start_tool_velocity")
             raise PlanningError(
                 "no motion keeps the velocity bounds near the ends of the joints' ranges: a joint starts too fast "
                 "towards one, or ends too close to one; stop first and plan from standstill, or choose a goal farther "
@@ -97,7 +107,7 @@ def plan_within_end_velocity(limits: JointLimits, plan: Callable[[float], Piecew
     while high > low * (1.0 + _PRECISION):
         middle = (low * high) ** 0.5
         found = plan(middle)
-        if _worst_excess(limits, found) <= 1.0:
+        if _worst_excess(limits, model, found) <= 1.0:
             low, curve = middle, found
         else:
             high = middle
@@ -149,9 +159,12 @@ def followable_bounds(limits: JointLimits, acceleration: Array, q: JointVector) 
     return np.maximum(lower, -down), np.minimum(upper, up)
 
 
-def _worst_excess(limits: JointLimits, curve: PiecewisePolynomial) -> float:
-    times = np.arange(0.0, curve.duration + CYCLE_TIME, CYCLE_TIME)
-    return float(end_excess(limits, curve.sample(times)).max(initial=0.0))
+def _worst_excess(limits: JointLimits, model: RobotModel | None, curve: PiecewisePolynomial) -> float:
+    path = curve.sample(np.arange(0.0, curve.duration + CYCLE_TIME, CYCLE_TIME))
+    excess = 0.0
+    if limits.near_ends is not None:
+        excess = float(end_excess(limits, path).max(initial=0.0))
+    return excess if model is None else max(excess, float(tool_excess(model, path).max(initial=0.0)))
 
 
 def _blocked(limits: JointLimits, joint: int, angle: float, is_up: bool) -> PlanningError:

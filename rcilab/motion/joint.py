@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import isfinite
 from typing import Literal, Protocol, get_args
 
 import numpy as np
@@ -14,7 +15,7 @@ from rcilab.core.limits import JointLimits, Limits
 from rcilab.model.robot_model import require_model
 from rcilab.motion import _ruckig
 from rcilab.motion.bounds import LIMIT_MARGIN, angle_text, require_inside
-from rcilab.motion.end_velocity import plan_within_end_velocity, require_approachable
+from rcilab.motion.end_velocity import plan_within_velocity, require_approachable
 from rcilab.motion.motion import Motion, stationary_motion
 from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE, plan_s_curve, synchronize
@@ -64,7 +65,7 @@ def plan_joint(
     """Returns a motion to standstill at `goal` on which all joints start and arrive together.
 
     Args:
-        model: The arm: a RobotModel, or another object with `n` and `limits`.
+        model: The arm: a RobotModel, or another object with `n` and `limits` if they do not bound the tool.
         start: Joint angles at the start, shape (n,), [rad]. Plan from the commanded angles (`state.q_c`).
         goal: Joint angles at the end, shape (n,), [rad]; strictly inside the limits, as the robot requires.
         speed: Part of the velocity and acceleration limits to use, from `MIN_SPEED` = 0.001 to 1; the
@@ -85,8 +86,8 @@ def plan_joint(
         InvalidValueError: Wrong shape, not finite, more than two turns, an unknown law, a speed out of range, or not an
             arm.
         PlanningError: A joint is outside its limits, or cannot stay inside them. Where an arm bounds its velocities
-            near the ends of the joints' ranges, the motion is slowed down as a whole, and refused if that is not
-            enough.
+            near the ends of the joints' ranges, or that of the tool (`Limits.joint_tool_velocity`), the motion is
+            slowed down as a whole, and refused if that is not enough.
     """
     if not hasattr(model, "limits"):
         require_model(model)
@@ -107,18 +108,19 @@ def plan_joint(
     if law == "s_profile":
         return _plan_s_profile(limits, start, goal, speed, dq, ddq)
     if law == "jerk_limited":
-        return _plan_jerk_limited(limits, start, goal, speed, dq, ddq)
+        return _plan_jerk_limited(model, start, goal, speed, dq, ddq)
     motion = plan_within_torque_rate(
         require_model(model),
-        lambda arm: _plan_jerk_limited(arm.limits.joint, start, goal, speed, dq, ddq),
+        lambda arm: _plan_jerk_limited(arm, start, goal, speed, dq, ddq),
         lambda planned: planned.polynomial,
     )
     return replace(motion, law=law)
 
 
 def _plan_jerk_limited(
-    limits: JointLimits, start: JointVector, goal: JointVector, speed: float, dq: JointVector, ddq: JointVector
+    arm: Arm, start: JointVector, goal: JointVector, speed: float, dq: JointVector, ddq: JointVector
 ) -> Motion:
+    limits = arm.limits.joint
     is_stationary = not dq.any() and not ddq.any()
     if is_stationary and np.array_equal(start, goal):
         return stationary_motion(goal, speed=speed)
@@ -131,7 +133,8 @@ def _plan_jerk_limited(
     def plan(part: float) -> PiecewisePolynomial:
         return _ruckig.plan_profile(start, goal, part * velocity, part * part * acceleration, jerk, dq, ddq)
 
-    curve = plan_within_end_velocity(limits, plan)
+    model = require_model(arm) if isfinite(arm.limits.joint_tool_velocity) else None
+    curve = plan_within_velocity(limits, plan, model)
     if not is_stationary:  # From standstill every joint moves straight from start to goal, and both are inside.
         _require_room(curve, limits)
     return Motion(polynomial=curve, goal=goal, law="jerk_limited", speed=speed)

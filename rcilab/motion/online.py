@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import degrees
+from math import degrees, isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,11 +17,14 @@ from rcilab.motion.bounds import LIMIT_MARGIN
 from rcilab.motion.end_velocity import braking_limits
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.stop import plan_stop
+from rcilab.motion.tool_velocity import JointSpeedGovernor
 from rcilab.motion.twist import Frame, TwistController
 
 POSITION_MARGIN = 1e-4  # [rad] A joint stops this far inside its range: more than the curve's rounding.
 
 _MAX_APPROACH_TIME = 1000.0  # [s] Ruckig represents 7600 s; a joint that would creep longer to its limit stops.
+_THERE = 1e-9  # [rad] A joint this close to its target does not move any farther.
+_LEAST_PART = 1e-3  # Of the speeds towards a target; below it the joints slow down first.
 _STANDSTILL = (1e-9, 1e-6)  # [rad/s], [rad/s^2] Rounding of the curve.
 
 
@@ -33,6 +36,7 @@ class Jog:
     joint that moves towards the end of its range stops `POSITION_MARGIN` inside it. A command that exceeds a limit is
     not an error: it is followed as far as the limits allow; see `part` and `is_damped`. Where an arm bounds its
     velocities near the ends of the ranges, a joint stops farther inside, and all accelerate less (`braking_limits`).
+    Where it bounds the tool's velocity (`Limits.joint_tool_velocity`), the joints are slower (`JointSpeedGovernor`).
 
         jog = Jog(model, robot.state.q_c)
         jog.set_twist([0.05, 0, 0, 0, 0, 0], frame="tool")
@@ -92,10 +96,13 @@ class Jog:
             float((joint.acceleration**2 / (2.0 * LIMIT_MARGIN * joint.jerk)).max()),
         )
         self._tool = TwistController(model, bounds.cartesian, self._lower, self._upper, self._speeds, a, j, speed)
+        self._governor = None
+        if isfinite(bounds.joint_tool_velocity):
+            self._governor = JointSpeedGovernor(model, bounds.joint_tool_velocity, j)
         self._axes = _ruckig.Stepper(start.tolist(), velocity.tolist(), acceleration.tolist(), a, j)
         self._zero_velocity = [0.0] * n
         self._goal = self._zero_velocity
-        self._part = 1.0
+        self._part = self._commanded_part = 1.0
         self._advance: Callable[[], None] = self._brake
 
     @property
@@ -146,8 +153,9 @@ class Jog:
             InvalidValueError: dq is not n finite numbers.
         """
         desired = as_vector(dq, self._model.n, "dq", "rad/s").tolist()
-        self._part = min([1.0, *(bound / abs(v) for v, bound in zip(desired, self._speeds, strict=True) if v)])
-        self._goal = [self._part * v for v in desired]
+        part = min([1.0, *(bound / abs(v) for v, bound in zip(desired, self._speeds, strict=True) if v)])
+        self._part = self._commanded_part = part
+        self._goal = [part * v for v in desired]
         self._advance = self._keep_velocity
 
     def set_twist(self, twist: ArrayLike, *, frame: Frame = "base") -> None:
@@ -210,10 +218,24 @@ class Jog:
             self._axes.step_to_velocity(self._zero_velocity)
 
     def _go_to_target(self) -> None:
-        self._axes.step_to_positions(self._goal, self._speeds)
+        axes, speeds = self._axes, self._speeds
+        if self._governor is not None:
+            moving = [v if abs(b - a) > _THERE else 0.0 for a, b, v in zip(axes.q, self._goal, speeds, strict=True)]
+            part = self._governor.part(moving, axes.dq, axes.ddq)
+            if part < _LEAST_PART:
+                axes.step_to_velocity(self._zero_velocity)
+                return
+            speeds = [part * v for v in speeds]
+        axes.step_to_positions(self._goal, speeds)
 
     def _keep_velocity(self) -> None:
-        self._step_to_velocity(self._goal)
+        goal = self._goal
+        if self._governor is not None:
+            axes = self._axes
+            part = self._governor.part([abs(v) for v in goal], axes.dq, axes.ddq)
+            goal = [part * v for v in goal]
+            self._part = self._commanded_part * part
+        self._step_to_velocity(goal)
 
     def _follow_twist(self) -> None:
         axes = self._axes

@@ -243,7 +243,7 @@ def _plan_run(
 
         def blended(arm: RobotModel) -> _Curve:
             coefficients, corners = plan_segment_spline(
-                spline, arm.limits, lambda part: report(_BLEND_SHARE + (1.0 - _BLEND_SHARE) * part)
+                spline, arm, lambda part: report(_BLEND_SHARE + (1.0 - _BLEND_SHARE) * part)
             )
             breaks = np.arange(len(coefficients) + 1, dtype=np.float64) * CYCLE_TIME
             return _Curve(breaks, coefficients, last.goal, last.waypoint.dwell, tuple(corners))

@@ -9,10 +9,13 @@ import numpy as np
 
 from rcilab.core.arrays import Array
 from rcilab.core.limits import JointLimits, Limits
+from rcilab.model.robot_model import RobotModel
 from rcilab.motion.bounds import LIMIT_MARGIN
 from rcilab.motion.end_velocity import bounds_along
 from rcilab.motion.path_bounds import MIN_SLOPE, POLYGON_FACTOR, PathBounds, half_planes, path_bounds
 from rcilab.motion.segment_spline import SegmentSpline, knot_derivatives
+
+_STEP = 1e-6  # Of s, for differences.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -44,8 +47,14 @@ def column_limits(limits: Limits) -> ColumnLimits:
     )
 
 
-def spline_bounds(spline: SegmentSpline, limits: ColumnLimits) -> PathBounds:
-    """Returns the bounds of a segment spline."""
+def spline_bounds(spline: SegmentSpline, limits: ColumnLimits, model: RobotModel | None) -> PathBounds:
+    """Returns the bounds of a segment spline.
+
+    Args:
+        spline: The spline.
+        limits: The bounds.
+        model: The arm if its tool is bounded by `Limits.joint_tool_velocity`; else None.
+    """
     first, second, third = knot_derivatives(spline)
     n = spline.n
     speed = np.minimum(_at_knots(spline.speed, 1.0, np.minimum), 1.0)
@@ -63,6 +72,12 @@ def spline_bounds(spline: SegmentSpline, limits: ColumnLimits) -> PathBounds:
         slopes = first[:, :n]
         allowed = LIMIT_MARGIN * bounds_along(limits.ends, spline.values(spline.knots, slice(n)), slopes)
         np.minimum(fastest, (allowed / np.maximum(np.abs(slopes), MIN_SLOPE)).min(axis=1), out=fastest)
+    if model is not None:
+        ends = np.clip([spline.knots - _STEP, spline.knots + _STEP], 0.0, spline.knots[-1])
+        before, after = (model.position_path(spline.values(s, slice(n))) for s in ends)
+        slope = np.linalg.norm(after - before, axis=1) / (ends[1] - ends[0])
+        allowed = LIMIT_MARGIN * model.limits.joint_tool_velocity / np.maximum(slope, MIN_SLOPE)
+        np.minimum(fastest, allowed, out=fastest)
     first[:, n:] *= moves_tool[:, np.newaxis]
     second[:, n:] *= moves_tool[:, np.newaxis]
     translation = half_planes(first[:, n + 1 : n + 4], second[:, n + 1 : n + 4])

@@ -10,7 +10,8 @@ import numpy as np
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import PlanningError
-from rcilab.core.limits import JointLimits, Limits
+from rcilab.core.limits import JointLimits
+from rcilab.model.robot_model import RobotModel
 from rcilab.motion.bounds import limit_touched
 from rcilab.motion.cycle_quintics import cycle_quintics, peak_derivatives
 from rcilab.motion.end_velocity import end_excess, find_blocked
@@ -18,6 +19,7 @@ from rcilab.motion.rows import OVERCORRECTION, blocks, spread
 from rcilab.motion.segment_spline import Rows, SegmentSpline
 from rcilab.motion.segment_spline_bounds import ColumnLimits, column_limits, spline_bounds
 from rcilab.motion.time_parametrization import FastestLaw, TimeParametrization, smooth_law
+from rcilab.motion.tool_velocity import tool_excess
 
 _ROUNDS = 12
 """Largest number of local slowdowns, and then of global ones. Observed: 1 to 4 local."""
@@ -30,7 +32,7 @@ _MIN_CHANGE = 1e-9
 
 
 def plan_segment_spline(
-    spline: SegmentSpline, limits: Limits, report: Callable[[float], None]
+    spline: SegmentSpline, model: RobotModel, report: Callable[[float], None]
 ) -> tuple[Array, list[float]]:
     """Returns the fastest curve along a spline, from standstill to standstill, and the times of the corners, [s].
 
@@ -39,18 +41,22 @@ def plan_segment_spline(
 
     Args:
         spline: The spline.
-        limits: Limits of the arm.
+        model: The arm, with its tool.
         report: Called before every round with the approximate progress; an exception raised by it cancels planning.
 
     Raises:
         PlanningError: A joint limit or a singularity is in the way.
     """
+    limits = model.limits
+    tool_model = model if math.isfinite(limits.joint_tool_velocity) else None
     bounds = column_limits(limits)
     _require_approachable(spline, limits.joint)
-    allowed = spline_bounds(spline, bounds)
+    allowed = spline_bounds(spline, bounds, tool_model)
     finite = np.isfinite(bounds.acceleration)
-    # From full deceleration to full acceleration.
-    reversal = 2.0 * float(spline.speed.max()) * float((bounds.acceleration[finite] / bounds.jerk[finite]).max())
+    # From full deceleration to full acceleration, which is not reached below the largest velocity if jerks are small.
+    velocity, acceleration, jerk = (table[finite] for table in (bounds.velocity, bounds.acceleration, bounds.jerk))
+    times = np.minimum(acceleration / jerk, np.sqrt(velocity / jerk))
+    reversal = 2.0 * float(spline.speed.max()) * float(times.max())
     cycles = max(2, math.ceil(reversal / CYCLE_TIME))
     fastest, slowdown = FastestLaw(allowed), np.ones(len(spline.knots))
     squares = np.zeros(len(spline.knots))
@@ -63,9 +69,9 @@ def plan_segment_spline(
         changed = np.abs(squares - before) > _MIN_CHANGE * squares
         # Later rounds change the law in few places; the rest is checked again only at the end.
         is_checked = changed[interval] | changed[interval + 1]
-        excess = _excess(spline, bounds, law, interval, is_checked)
+        excess = _excess(spline, bounds, tool_model, law, interval, is_checked)
         if excess.max() <= 1.0 and not is_checked.all():
-            excess = _excess(spline, bounds, law, interval, np.ones_like(is_checked))
+            excess = _excess(spline, bounds, tool_model, law, interval, np.ones_like(is_checked))
         if excess.max() <= 1.0:
             q, coefficients = _curve(spline, law)
             _require_inside(spline, q, law, limits.joint)
@@ -103,13 +109,19 @@ def _curve(spline: SegmentSpline, law: TimeParametrization) -> tuple[Array, Arra
 
 
 def _excess(
-    spline: SegmentSpline, limits: ColumnLimits, law: TimeParametrization, interval: Rows, is_checked: Array
+    spline: SegmentSpline,
+    limits: ColumnLimits,
+    model: RobotModel | None,
+    law: TimeParametrization,
+    interval: Rows,
+    is_checked: Array,
 ) -> Array:
     """Returns the slowdown that each row needs to be inside every bound, shape (N,); 0 in blocks that are not checked.
 
     Args:
         spline: The spline.
         limits: The bounds.
+        model: The arm if its tool is bounded by `Limits.joint_tool_velocity`; else None.
         law: The time law.
         interval: Interval of each row, shape (N,).
         is_checked: Rows to check, shape (N,); whole blocks are checked.
@@ -123,6 +135,8 @@ def _excess(
             excess[block] = _joint_excess(spline, limits, powers, interval[ends])
             if limits.ends is not None:
                 np.maximum(excess[block], end_excess(limits.ends, q), out=excess[block])
+            if model is not None:
+                np.maximum(excess[block], tool_excess(model, q), out=excess[block])
             np.maximum(excess[ends], _tool_excess(spline, limits, law, interval, ends), out=excess[ends])
     return excess
 

@@ -22,10 +22,10 @@ from rcilab.makers.rokae.conditions import RCI_JOINT_CONDITIONS
 from rcilab.model.kinematics.collision import ClearanceQuery
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
-from tests.arms import STREAMED
+from tests.arms import REPRESENTATIVE
 
-MODELS = [load_model(name, tool=Pose((0.0, 0.02, 0.1))) for name in STREAMED]
-MODEL = MODELS[STREAMED.index("xMatePro7")]
+MODELS = [load_model(name, tool=Pose((0.0, 0.02, 0.1))) for name in REPRESENTATIVE]
+MODEL = MODELS[REPRESENTATIVE.index("xMatePro7")]
 ASKED = ClearanceLimit(tool_radius=0.02, floor=0.01)
 ON_THE_FLOOR = np.array([0.0, 2.0, 0.0, 0.3, 0.0, 0.2, 0.0])
 

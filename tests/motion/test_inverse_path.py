@@ -11,9 +11,9 @@ from rcilab.core.errors import SingularError, UnreachableError
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.motion.inverse_path import inverse_path
-from tests.arms import ANY_POSE, STREAMED
+from tests.arms import ANY_POSE, REPRESENTATIVE
 
-ALL = pytest.mark.parametrize("name", STREAMED)
+ALL = pytest.mark.parametrize("name", REPRESENTATIVE)
 TOOL = Pose.from_rpy((0.02, -0.01, 0.1), (0.1, 0.2, 0.3))
 SEVEN = load_model("xMatePro7")
 

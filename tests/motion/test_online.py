@@ -13,12 +13,12 @@ from rcilab.motion import Jog, Motion, plan_joint, plan_stop
 from rcilab.motion.end_velocity import braking_limits
 from rcilab.motion.online import POSITION_MARGIN
 from rcilab.motion.twist import DAMPED_BELOW, damped_inverse
-from tests.arms import STREAMED
+from tests.arms import REPRESENTATIVE
 
-MODELS = {name: load_model(name) for name in STREAMED}
+MODELS = {name: load_model(name) for name in REPRESENTATIVE}
 MODEL = MODELS["xMatePro7"]
 LIMITS = MODEL.limits.joint
-LONG = 20_000  # Cycles that every motion to rest is shorter than.
+LONG = 60_000  # Cycles that every motion to rest is shorter than: two turns of a joint, slowly.
 
 arms = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
 seeds = st.integers(0, 2**32)
@@ -205,6 +205,7 @@ def test_a_twist_is_followed_in_its_direction_until_a_singularity(model, frame, 
     wanted = size * np.random.default_rng(seed).normal(size=6)
     jog = Jog(model.with_tool(Pose((0.05, 0.0, 0.1))), model.home)
     jog.set_twist(wanted, frame=frame)
+    lag = (model.limits.joint.acceleration**2 / (2.0 * model.limits.joint.jerk)).max()
     rows = [model.home] * 4
     for k in range(800):
         rows.append(jog.step())
@@ -214,9 +215,9 @@ def test_a_twist_is_followed_in_its_direction_until_a_singularity(model, frame, 
             continue
         actual = twist_of(jog._model, jog, frame)
         along = actual @ wanted / (wanted @ wanted)
-        # The joints follow each cycle's velocity with a lag of up to acceleration^2 / (2 jerk).
-        assert np.linalg.norm(actual - along * wanted) < 0.02 * np.linalg.norm(actual) + 0.003
-        assert along < jog.part + 0.003
+        # The joints follow each cycle's velocity with a lag of up to acceleration^2 / (2 jerk), 0.4 rad/s of an xArm.
+        assert np.linalg.norm(actual - along * wanted) < 0.02 * np.linalg.norm(actual) + 0.003 + 0.02 * lag
+        assert along < jog.part + 0.003 + 0.02 * lag
     assert_inside_limits(model, rows)
 
 
@@ -293,7 +294,9 @@ def test_the_tool_keeps_its_own_velocity_limits(model, seed):
 @arms
 def test_through_a_singularity_the_arm_says_that_it_damps_and_stays_inside_its_limits(model):
     q = model.home.copy()
-    if model.limits.joint.upper[model.n - 4] > 0.01:
+    if model.name == "xArm6":
+        q[2] = -2.73  # Its elbow is stretched there.
+    elif model.limits.joint.upper[model.n - 4] > 0.01:
         q[model.n - 4] = 0.01  # The arm is nearly stretched.
     else:
         q[1:3] = 0.01, np.pi / 2.0  # The Panda's elbow ends before: axes 1 and 3 are nearly one, and 2 lies across.

@@ -27,7 +27,7 @@ from rcilab.conformance.common_conditions import (
 )
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import ConditionTable, all_limits, symmetric_bounds
-from rcilab.makers.ufactory.bounds import REPORT_PERIOD, SERVO_SPEED_FACTOR, SERVO_STEP
+from rcilab.makers.ufactory.bounds import REPORT_PERIOD, SERVO_STEP
 from rcilab.makers.ufactory.errors import UfactoryError
 
 _MANUAL = "user manual of UFACTORY Studio"
@@ -56,8 +56,8 @@ _SERVO_SPEED = replace(
     _TOOL_RATES[0],
     id="servo.velocity.translation",
     fault=UfactoryError.SERVO_LINEAR_SPEED,
-    source=f"client library, table of codes, 60, and set_linear_spd_limit_factor ({SERVO_SPEED_FACTOR:g} by default)",
-    bounds=lambda limits: symmetric_bounds(SERVO_SPEED_FACTOR * all_limits(limits).cartesian.translation_velocity),
+    source="client library, table of codes, 60, and default of set_linear_spd_limit_factor",
+    bounds=lambda limits: symmetric_bounds(all_limits(limits).joint_tool_velocity),
 )
 """On the tool of a motion that is sent as joint angles."""
 

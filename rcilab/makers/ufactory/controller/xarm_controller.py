@@ -39,7 +39,7 @@ from rcilab.makers.ufactory.controller.modes import (
 )
 from rcilab.makers.ufactory.controller.neutral_state import build_neutral_state
 from rcilab.makers.ufactory.controller.queue_end import QueueEnd
-from rcilab.makers.ufactory.controller.settings import MILLIMETRE, TOOL_SPEED, Settings, apply_setup
+from rcilab.makers.ufactory.controller.settings import MILLIMETRE, Settings, apply_setup
 from rcilab.makers.ufactory.controller.signals import Signals
 from rcilab.makers.ufactory.errors import UfactoryError, UfactoryWarning
 from rcilab.model.robot_model import RobotModel
@@ -178,7 +178,7 @@ class XArmController:
             joint = replace(
                 joint, lower=readonly_copy(settings.reduced_lower), upper=readonly_copy(settings.reduced_upper)
             )
-        return replace(limits, joint=joint)
+        return replace(limits, joint=joint, joint_tool_velocity=inf)  # Which is of mode 1 alone.
 
     @property
     def loop_back(self) -> bool:
@@ -531,9 +531,10 @@ class XArmController:
             return
         if self.mode is Mode.SERVO:
             speed = hypot(*self.arm.tool_c.twist[:3])
-            if speed > TOOL_SPEED * _SPEED_MARGIN:
-                text = f"the tool would move with {speed:.3g} m/s, faster than {TOOL_SPEED:g} m/s"
-                remark = Remark(text, "servo_speed", value=speed, bound=TOOL_SPEED, unit="m/s")
+            bound = self.model.limits.joint_tool_velocity
+            if speed > bound * _SPEED_MARGIN:
+                text = f"the tool would move with {speed:.3g} m/s, faster than {bound:g} m/s"
+                remark = Remark(text, "servo_speed", value=speed, bound=bound, unit="m/s")
                 self.fail(UfactoryError.SERVO_LINEAR_SPEED, remark)
                 return
         if self.settings.self_collision:

@@ -22,6 +22,7 @@ from rcilab.makers.ufactory.bounds import (
     JOINT_ACCELERATION,
     JOINT_JERK,
     JOINT_VELOCITY,
+    SERVO_SPEED_FACTOR,
     TOOL_ACCELERATION,
     TOOL_JERK,
     TOOL_ROTATION,
@@ -83,6 +84,7 @@ def ufactory_limits(
         "cartesian.rotation_stiffness": "the interface has no impedance",
         "cartesian.force": "the interface takes no desired force",
         "cartesian.moment": "the interface takes no desired moment",
+        "joint_tool_velocity": f"{SDK}, table of codes, 60, and set_linear_spd_limit_factor ({SERVO_SPEED_FACTOR:g})",
     }
     if n == 7:
         sources |= {
@@ -113,6 +115,7 @@ def ufactory_limits(
             if n == 7
             else None
         ),
+        joint_tool_velocity=SERVO_SPEED_FACTOR * tool_velocity,
         sources=MappingProxyType(sources),
     )
 

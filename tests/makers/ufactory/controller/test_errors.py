@@ -122,6 +122,26 @@ def test_an_error_is_raised_by_its_condition_and_stops_the_arm(
     assert arm.error == (0, 0)
 
 
+def test_a_servo_target_raises_c60_above_the_bound_of_the_check_and_not_below_it(arm: Arm) -> None:
+    bound = arm.controller.model.limits.joint_tool_velocity
+    far = (0.2, 0.6, -1.8, 0.0, 1.2, 0.0)
+    arm.controller.set_up(ArmSetup(q=far))
+    arm.ready(Mode.SERVO)
+    lever = float(np.linalg.norm(arm.controller.arm.tool_c.position[:2]))
+    speeds: list[float] = []
+    angle = far[0]
+    for cycle in range(600):  # Ever faster.
+        angle += 0.5 * cycle / 200 * 0.001 * bound / lever
+        if cycle % 4 == 0:
+            arm.call(Function.SERVO_JOINT, "10f", angle, *far[1:], *NOTHING)
+        arm.step()
+        if arm.controller.error is not None:
+            break
+        speeds.append(float(np.linalg.norm(arm.controller.arm.tool_c.twist[:3])))
+    assert arm.controller.error == 60
+    assert 0.95 * bound < max(speeds) < 1.01 * bound
+
+
 def test_an_emergency_stop_switches_the_motors_off_and_stays_while_it_is_pressed(arm: Arm) -> None:
     press(arm)
     arm.step()
