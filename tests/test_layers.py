@@ -72,6 +72,7 @@ NAMES_A_MAKER = {
     "rcilab.diagnostics.bench.controller": "measures codec and controller of the RCI",
     "rcilab.diagnostics.bench.franka": "measures the controller of the FCI",
     "rcilab.diagnostics.bench.record": "measures the record of the RCI controller",
+    "rcilab.diagnostics.bench.ufactory": "measures the controller of the xArm interface",
 }
 """Modules outside `makers` that import a maker's folder, and why."""
 

@@ -11,6 +11,7 @@ from rcilab.model.kinematics.solvers.offset6.arm import build_offset_six
 from rcilab.model.kinematics.solvers.offset6.solver import OffsetSix
 from rcilab.model.kinematics.solvers.offset7.arm import build_offset_geometry
 from rcilab.model.kinematics.solvers.offset7.solver import OffsetSeven
+from rcilab.model.kinematics.solvers.parallel6 import ParallelSix, build_parallel_six
 from rcilab.model.kinematics.solvers.solver import KinematicsSolver
 from rcilab.model.kinematics.solvers.spherical.inverse import build_geometry
 from rcilab.model.kinematics.solvers.spherical6 import SphericalSix
@@ -36,6 +37,10 @@ def build_solver(description: RobotDescription) -> KinematicsSolver:
         pass
     try:
         return OffsetSix(description, build_offset_six(description))
+    except ModelError:
+        pass
+    try:
+        return ParallelSix(description, build_parallel_six(description))
     except ModelError:
         pass
     try:

@@ -1,13 +1,13 @@
 """A 6-axis arm with parallel axes 2 and 3 and an offset between axes 5 and 6, or none: lengths and signs.
 
-Axis 1 is vertical and meets axis 2; axes 4 and 5 meet in the wrist W, at a right angle. Elbow and wrist move in the
-vertical plane through axis 1: the upper arm from the shoulder to axis 3, the forearm from there to W. Axis 4 is in that
-plane, too, but need not point along the forearm.
+Axis 1 is vertical and meets axis 2, or with a spherical wrist may pass it at a distance; axes 4 and 5 meet in the wrist
+W, at a right angle. Elbow and wrist move in the vertical plane through axis 1: the upper arm from the shoulder to axis
+3, the forearm from there to W. Axis 4 is in that plane, too, but need not point along the forearm.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan2, cos, hypot, pi, sin
 
 from rcilab.core.errors import ModelError
@@ -25,6 +25,8 @@ class OffsetSixGeometry:
 
     shoulder: float
     """Height of the shoulder above the base."""
+    ahead: float
+    """Of the shoulder, in the plane, from axis 1; zero with an offset wrist."""
     upper: float
     """Shoulder to axis 3."""
     fore: float
@@ -65,6 +67,7 @@ def build_offset_six(description: RobotDescription) -> OffsetSixGeometry:
     forward = -same * round(sin(dh[2].alpha))
     return OffsetSixGeometry(
         shoulder=dh[0].d,
+        ahead=dh[0].a,
         upper=dh[1].a,
         fore=hypot(dh[2].a, dh[3].d),
         wrist=dh[4].a,
@@ -83,6 +86,6 @@ def _has_shape(dh: tuple[DhRow, ...]) -> bool:
     are_turns = all(abs(abs(sin(row.alpha)) - (i not in (1, 5))) < _EXACT for i, row in enumerate(dh))
     are_lengths = all(
         not (row.a if length == "d" else row.d) and (length == "a" or row.d > 0.0)
-        for row, length in zip(dh, _LENGTHS, strict=True)
+        for row, length in zip((replace(dh[0], a=0.0), *dh[1:]), _LENGTHS, strict=True)
     )
-    return are_turns and are_lengths and dh[1].a > 0.0 and abs(dh[5].alpha) < _EXACT
+    return are_turns and not (dh[0].a and dh[4].a) and are_lengths and dh[1].a > 0.0 and abs(dh[5].alpha) < _EXACT

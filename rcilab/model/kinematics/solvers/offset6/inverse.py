@@ -87,8 +87,8 @@ class _Trunks:
 
     def __init__(self, arm: OffsetSixGeometry, v: Array, guess: Sequence[float]) -> None:
         flat = v[:, 0] ** 2 + v[:, 1] ** 2
-        square, height = flat + v[:, 2] ** 2, arm.rise * v[:, 2]
-        r = _SIDES * np.sqrt(flat)
+        r, height = _SIDES * np.sqrt(flat) - arm.ahead, arm.rise * v[:, 2]
+        square = r * r + height * height
         first = np.where(flat < _FOLDED, guess[0] + arm.offsets[0], np.arctan2(v[:, 1], v[:, 0]))
         first = first + np.where(_SIDES > 0.0, 0.0, pi)
         K = 0.5 * (square + arm.fore**2 - arm.upper**2)
