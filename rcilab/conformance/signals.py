@@ -52,7 +52,7 @@ class Record:
     """Commanded joint angles before the first row, shape (n,), [rad], where the controller absorbed its distance from
     them: it is compared with them but not differentiated. None: the start of the check."""
     has_free_elbow: bool = False
-    """Whether the controller left the arm angle free: it has no conditions, nor poses that are singular for it alone."""
+    """Whether the controller left the arm angle free: it has no conditions then, nor poses singular for it alone."""
 
 
 class MotionSignals:

@@ -42,7 +42,7 @@ def inverse_path(
 def free_inverse_path(model: RobotModel, T: Array, psi: Array, start: JointVector) -> JointPath:
     """Returns the joint angles along a path of the tool, where the joints move least from row to row.
 
-    It is the inverse of a controller that leaves the arm angle free. Joint limits are not checked. About 100 us per row.
+    It is the inverse of a controller that leaves the arm angle free. Joint limits are not checked. 100 us per row.
 
     Args:
         model: The arm, with its tool.

@@ -5,9 +5,10 @@ branch, then the soft-limit governor if enabled, and finally the conditions of t
 with the acceleration of the last poses, or holds the joint angles of the last one; then the filter takes the path over
 the pause once the next pose is there.
 
-The arm angle of a 7-axis arm is the commanded one if it is valid. Otherwise it is free, where the maker leaves it so, or
-held: from the start of the motion, or from the last command with one. The vendor's client cannot command an arm angle of exactly zero (it is sent as "not
-valid"); therefore an arm angle that is not valid counts as zero while the arm angle passes zero.
+The arm angle of a 7-axis arm is the commanded one if it is valid. Otherwise it is free, where the maker leaves it so,
+or held: from the start of the motion, or from the last command with one. The vendor's client cannot command an arm
+angle of exactly zero (it is sent as "not valid"); therefore an arm angle that is not valid counts as zero while the arm
+angle passes zero.
 """
 
 from __future__ import annotations

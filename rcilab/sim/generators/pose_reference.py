@@ -12,9 +12,9 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose, rotation_between
 from rcilab.i18n.translator import Remark
+from rcilab.motion.ik_tracker import IkTracker
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.generators.generator import GeneratorOutput, JointReference, lost_motion, with_jump
-from rcilab.motion.ik_tracker import IkTracker
 from rcilab.sim.generators.motion_limits import MotionLimits
 from rcilab.sim.generators.start import StartMonitor, find_tool_jump
 from rcilab.sim.violations import ArmCondition, ArmViolation

@@ -14,8 +14,8 @@ from rcilab.core.spatial import Pose, rotation_from_wxyz
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.blend import Blend
 from rcilab.motion.hermite import DIFFERENCE_STEP, State, central_state
-from rcilab.motion.path import Path, build_line
 from rcilab.motion.ik_tracker import IkTracker
+from rcilab.motion.path import Path, build_line
 from rcilab.sim.planner.guide import Guide
 
 _LENGTH_STEP = 0.01  # [m] Between the samples of a path of the tool; a tuning value.
