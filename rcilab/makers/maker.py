@@ -58,6 +58,8 @@ class Capabilities:
     """Whether motor power is switched over its interface; otherwise the states say whether the arm can move."""
     has_gate: bool = False
     """Whether a safety gate stops it, besides the emergency stop."""
+    stop_is_error: bool = False
+    """Whether an emergency stop is an error that stays until a recovery, also after its release."""
     setup: tuple[SetupPart, ...] = ()
     """The parts of its configuration: safety box, tool, load, force-control frame, soft joint limits, parameters."""
     options: tuple[ControllerOption, ...] = ()

@@ -341,7 +341,8 @@ class RunPanel(Part):
         is_ready = phase in ("idle", "fault")
         self.power_on.disabled = not is_ready or powered is not False or is_pressed
         self.power_off.disabled = not is_ready or powered is not True
-        self.recover.disabled = phase not in ("fault", "lost", "crashed") or is_pressed
+        is_held = is_pressed and not capabilities_of(state.model).stop_is_error
+        self.recover.disabled = phase not in ("fault", "lost", "crashed") or is_held
         name = (
             ""
             if state.robot is None

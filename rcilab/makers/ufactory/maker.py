@@ -47,6 +47,7 @@ class Ufactory:
         outputs=OUTPUTS,
         inputs=INPUTS,
         switches_power=True,
+        stop_is_error=True,
         setup=("box", "tool", "load", "joints", "control"),
         options=("loop_back",),
         longest_tool=LONGEST_TOOL,

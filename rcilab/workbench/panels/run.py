@@ -135,7 +135,8 @@ class RunPanel:
         self._plan.visible, self._to_target.visible = not is_program, is_program
         is_off = moving or bool(state.watched)
         self._plan.disabled = self._to_target.disabled = is_off or not is_connected(status)
-        self._buttons["recover"].disabled = is_off or status.phase != "fault" or status.is_pressed
+        is_held = status.is_pressed and not capabilities_of(state.model).stop_is_error
+        self._buttons["recover"].disabled = is_off or status.phase != "fault" or is_held
         if "power_on" in self._buttons:
             self._buttons["power_on"].disabled = is_off or status.powered is not False or status.is_pressed
             self._buttons["power_off"].disabled = is_off or status.powered is not True

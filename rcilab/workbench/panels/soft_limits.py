@@ -12,6 +12,7 @@ from rcilab.app.setup.configuration_state import own_limits, soft_limits
 from rcilab.app.setup.setup_actions import PressSetup
 from rcilab.app.setup.setup_fields import JOINT_ENDS
 from rcilab.app.text import Text
+from rcilab.makers.maker import capabilities_of
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class SoftLimitsPanel:
-    """Two groups of the Setup tab: two numbers per joint, and the behaviour at the limits."""
+    """Two groups of the Setup tab: two numbers per joint, and where it can be chosen, the behaviour at the limits."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -45,6 +46,9 @@ class SoftLimitsPanel:
             self._problems = Html(gui)
             self._whole = gui.add_button(text("softlimits.whole"), icon="restore", color="gray")
             on_press(self._whole, ask, lambda page: PressSetup(page=page, what="whole"))
+        self._has_auto = "auto_limit" in capabilities_of(state.model).options
+        if not self._has_auto:
+            return
         with gui.add_folder(text("softlimits.beyond"), expand_by_default=False):
             auto = gui.add_checkbox(text("softlimits.auto"), False, hint=text("softlimits.auto_hint"))
             self._auto = BoundControl(auto, ask, lambda v, p: SetWiring(page=p, name="auto_limit", on=bool(v)))
@@ -61,5 +65,7 @@ class SoftLimitsPanel:
             field.show(number, state.problems.get(field.field), state.entered)
         self._problems.show(problems_html(state, self._text, self._named))
         self._whole.disabled = limits == own_limits(state) or is_fixed
+        if not self._has_auto:
+            return
         self._auto.show(state.world.auto_limit)
         self._auto.handle.disabled = not is_ours(status)
