@@ -142,7 +142,7 @@ def _joint(order: int) -> Condition:
         stage="throughout",
         order=order,
         bounds=_symmetric(name) if order else _joint_range,
-        bounds_at=JointLimits.velocity_bounds if order == 1 else None,
+        bounds_at=JointLimits.checked_velocity_bounds if order == 1 else None,
     )
 
 

@@ -12,7 +12,7 @@ from rcilab.conformance.divided_differences import EVEN_TIMES, difference_times
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.limits import SMALLEST_END_VELOCITY, JointLimits
+from rcilab.core.limits import JointLimits
 
 _ROUNDING = 1e-9  # Of the distance from the ends beyond which a velocity bound is constant.
 
@@ -95,7 +95,7 @@ class JointMonitor:
 
 
 class _EndBounds:
-    """The velocity bounds near the ends of the joints' ranges, in plain floats; as `JointLimits.velocity_bounds`."""
+    """`JointLimits.checked_velocity_bounds` near the ends of the joints' ranges, in plain floats."""
 
     def __init__(self, limits: JointLimits, rows: Sequence[Condition]) -> None:
         n, own, ends = len(limits.velocity), limits if limits.own is None else limits.own, limits.near_ends
@@ -105,20 +105,24 @@ class _EndBounds:
         if ends is not None:
             velocity, offset, twice = limits.velocity, ends.offset, 2.0 * ends.deceleration
             near = (1.0 + _ROUNDING) * (velocity + offset) ** 2 / twice
-            columns = own.lower, own.upper, velocity, offset, twice, own.lower + near, own.upper - near
+            columns = own.lower, own.upper, velocity, offset, twice, own.lower + near, own.upper - near, ends.rounding
             self._joints = list(zip(*(column.tolist() for column in columns), strict=True))
 
     def apply(self, table: BoundsTable, q: Sequence[float]) -> None:
         """Sets the bounds for a command after joint angles, n numbers, [rad]."""
         lowest: list[float] = []
         highest: list[float] = []
-        for angle, (low, high, velocity, offset, twice, near_low, near_high) in zip(q, self._joints, strict=True):
-            lowest.append(-velocity if angle > near_low else -_end_velocity(twice * (angle - low), offset, velocity))
-            highest.append(velocity if angle < near_high else _end_velocity(twice * (high - angle), offset, velocity))
+        for angle, (low, high, velocity, offset, twice, near_low, near_high, least) in zip(
+            q, self._joints, strict=True
+        ):
+            speed = velocity if angle > near_low else _end_velocity(twice * (angle - low), offset, velocity, least)
+            lowest.append(-speed)
+            speed = velocity if angle < near_high else _end_velocity(twice * (high - angle), offset, velocity, least)
+            highest.append(speed)
         for first in self.rows:
             table.set_bounds(first, lowest, highest)
 
 
-def _end_velocity(square: float, offset: float, velocity: float) -> float:
+def _end_velocity(square: float, offset: float, velocity: float, least: float) -> float:
     speed = sqrt(square) - offset if square > 0.0 else 0.0
-    return min(max(speed, SMALLEST_END_VELOCITY), velocity)
+    return min(max(speed, least), velocity)

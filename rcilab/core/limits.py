@@ -17,23 +17,22 @@ _ROUNDING = (
     1e-6  # [rad] Soft limits that are this close to the arm's own limits equal them: they are converted from degrees.
 )
 
-SMALLEST_END_VELOCITY = 1e-3  # [rad/s]
-"""Velocity that a joint may have anywhere in its range. Reason: where the bound decreases to zero, a joint that stands
-must not violate it by rounding, which is up to 2e-4 rad/s for clients that compute with single precision."""
-
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class EndVelocity:
     """Velocity bounds that decrease towards the ends of the joints' ranges.
 
-    At a distance d from the end, a joint may approach it with sqrt(2 deceleration d) - offset: slowly enough to brake
-    with this deceleration. Its velocity away from the end is not affected.
+    At a distance d from the end, a joint may approach it with sqrt(2 deceleration d) - offset, or not at all where that
+    is negative: slowly enough to brake with this deceleration. Its velocity away from the end is not affected.
     """
 
     offset: JointVector
     """Shape (n,), [rad/s]."""
     deceleration: JointVector
     """Shape (n,), [rad/s^2]."""
+    rounding: JointVector
+    """Velocity that a standing joint seems to have by the rounding of the state, shape (n,), [rad/s]. The check allows
+    it where the bound is lower: where that is zero, no command would be below it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -64,13 +63,13 @@ class JointLimits:
     """How `velocity` decreases towards the ends of the arm's own range; None: it does not."""
 
     def velocity_bounds(self, q: Array) -> tuple[Array, Array]:
-        """Returns the smallest and the largest velocity at joint angles.
+        """Returns the smallest and the largest velocity at joint angles, by the maker's formula.
 
         Args:
             q: Joint angles one cycle before, shape (n,) or (N, n), [rad]: the last command, which a controller reports.
 
         Returns:
-            Both of the shape of q, [rad/s].
+            Both of the shape of q, [rad/s]; zero next to an end.
         """
         if self.near_ends is None:
             bound = np.broadcast_to(self.velocity, q.shape)
@@ -78,10 +77,17 @@ class JointLimits:
         own = self if self.own is None else self.own
         offset, twice = self.near_ends.offset, 2.0 * self.near_ends.deceleration
         down, up = (
-            np.clip(np.sqrt(np.maximum(twice * room, 0.0)) - offset, SMALLEST_END_VELOCITY, self.velocity)
+            np.clip(np.sqrt(np.maximum(twice * room, 0.0)) - offset, 0.0, self.velocity)
             for room in (q - own.lower, own.upper - q)
         )
         return -down, up
+
+    def checked_velocity_bounds(self, q: Array) -> tuple[Array, Array]:
+        """Returns the bounds of the check, and of plans: as `velocity_bounds`, but at least `EndVelocity.rounding`."""
+        lower, upper = self.velocity_bounds(q)
+        if self.near_ends is None:
+            return lower, upper
+        return np.minimum(lower, -self.near_ends.rounding), np.maximum(upper, self.near_ends.rounding)
 
     def __repr__(self) -> str:
         hidden = ("own",) if self.near_ends is not None else ("own", "near_ends")

@@ -10,7 +10,7 @@ import numpy as np
 from rcilab.core.arrays import Array, JointPath, JointVector, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import PlanningError
-from rcilab.core.limits import SMALLEST_END_VELOCITY, JointLimits
+from rcilab.core.limits import JointLimits
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.bounds import LIMIT_MARGIN, angle_text
 from rcilab.motion.piecewise import PiecewisePolynomial
@@ -34,13 +34,13 @@ def end_excess(limits: JointLimits, path: JointPath) -> Array:
         path: Joint angles in consecutive cycles, shape (N, n), [rad].
     """
     dq = np.diff(path, axis=0) / CYCLE_TIME
-    lower, upper = limits.velocity_bounds(path[:-1])
+    lower, upper = limits.checked_velocity_bounds(path[:-1])
     return (dq / (LIMIT_MARGIN * np.where(dq < 0.0, lower, upper))).max(axis=1)
 
 
 def bounds_along(limits: JointLimits, path: JointPath, slopes: Array) -> Array:
     """Returns the velocity bounds of joints that move in the direction of `slopes`, shape (N, n), [rad/s]."""
-    lower, upper = limits.velocity_bounds(path)
+    lower, upper = limits.checked_velocity_bounds(path)
     return np.where(slopes < 0.0, -lower, upper)
 
 
@@ -55,7 +55,7 @@ def find_blocked(limits: JointLimits, path: JointPath) -> tuple[int, PlanningErr
         return None
     steps = np.diff(path, axis=0)
     allowed = bounds_along(limits, path[1:], steps)
-    found = np.argwhere((allowed <= SMALLEST_END_VELOCITY) & (np.abs(steps) > _STILL))
+    found = np.argwhere((allowed <= limits.near_ends.rounding) & (np.abs(steps) > _STILL))
     if not found.size:
         return None
     row, joint = found[0].tolist()
@@ -147,7 +147,7 @@ def followable_bounds(limits: JointLimits, acceleration: Array, q: JointVector) 
         q: Joint angles, shape (n,), [rad].
     """
     ends, own = limits.near_ends, limits if limits.own is None else limits.own
-    lower, upper = limits.velocity_bounds(q)
+    lower, upper = limits.checked_velocity_bounds(q)
     assert ends is not None
     excess = ends.deceleration - acceleration
     velocity = np.where(excess > 0.0, acceleration * ends.offset / np.maximum(excess, _STILL), np.inf)
@@ -171,7 +171,7 @@ def _blocked(limits: JointLimits, joint: int, angle: float, is_up: bool) -> Plan
     """Returns the error for a joint, from 0, that would come too close to an end of its range."""
     own, ends = limits if limits.own is None else limits.own, limits.near_ends
     assert ends is not None
-    distance = float((ends.offset[joint] + SMALLEST_END_VELOCITY) ** 2 / (2.0 * ends.deceleration[joint]))
+    distance = float((ends.offset[joint] + ends.rounding[joint]) ** 2 / (2.0 * ends.deceleration[joint]))
     end = float((own.upper if is_up else own.lower)[joint])
     last = end - distance if is_up else end + distance
     return PlanningError(

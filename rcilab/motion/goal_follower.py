@@ -45,7 +45,7 @@ class GoalFollower:
     def set_goal(self, q: Sequence[float]) -> None:
         """Moves to these joint angles, n finite numbers, [rad], from the next step on."""
         self._goal = list(q)
-        lowest, highest = self._limits.velocity_bounds(np.array(self._goal))
+        lowest, highest = self._limits.checked_velocity_bounds(np.array(self._goal))
         bounds: list[float] = (LIMIT_MARGIN * np.minimum(-lowest, highest)).tolist()
         self._velocity = list(map(min, self._largest, bounds))
 

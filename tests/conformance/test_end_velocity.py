@@ -14,7 +14,6 @@ from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.conformance.motion_monitor import Monitor
 from rcilab.conformance.start import StartState
 from rcilab.core.command import JointPosition
-from rcilab.core.limits import SMALLEST_END_VELOCITY
 from rcilab.makers.franka.conditions import FR3_CONDITIONS
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.model.robot_model import load_model
@@ -35,10 +34,40 @@ def test_the_bounds_are_those_of_the_makers_formula() -> None:
     assert (up[[1, 4, 6]] == [2.62, -0.35 + sqrt(34.0 * (2.8101 - 2.0)), 5.26]).all()
 
 
+def documented(q: np.ndarray) -> np.ndarray:
+    """Returns the bounds of the page, max(0, sqrt(2 a d) - offset) towards both ends, shape (2, 7)."""
+    offset = np.array([0.30, 0.20, 0.20, 0.30, 0.35, 0.35, 0.35])
+    twice = 2.0 * np.array([6.0, 2.585, 3.5, 4.0, 17.0, 5.5, 17.0])
+    distance = np.stack((q - LIMITS.lower, LIMITS.upper - q))
+    return np.minimum(LIMITS.velocity, np.maximum(0.0, np.sqrt(twice * distance) - offset))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_is_checked_is_the_makers_formula_and_at_least_the_rounding_of_the_state(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    near = rng.choice([1e-4, 1e-2, 0.1, 1.0], 7) * rng.uniform(0.0, 1.0, 7)
+    q = np.where(rng.random(7) < 0.5, LIMITS.lower + near, LIMITS.upper - near)
+    down, up = documented(q)
+    assert np.array(LIMITS.velocity_bounds(q)) == pytest.approx(np.stack((-down, up)), abs=1e-12)
+    rounding = np.array([1.2e-4, 6e-5, 1.2e-4, 1.2e-4, 1.2e-4, 2.4e-4, 1.2e-4])
+    monitor = JointMonitor(LIMITS, ROWS)
+    for share, is_allowed in ((0.999, True), (1.001, False)):
+        for velocity in (np.maximum(up, rounding) * share, np.minimum(-down, -rounding) * share):
+            monitor.reset(q.tolist(), velocity.tolist())
+            found = {v.axis for v in monitor.step((q + 0.001 * velocity).tolist()) if v.condition is ROWS[1]}
+            assert found == (set() if is_allowed else set(range(1, 8)))
+
+
 def test_a_joint_at_the_end_of_its_range_may_stand_and_move_away() -> None:
     down, up = LIMITS.velocity_bounds(LIMITS.upper - 1e-3)
-    assert (up == SMALLEST_END_VELOCITY).all()
+    assert (up == 0.0).all()
     assert (down == -LIMITS.velocity).all()
+    q = np.repeat((LIMITS.upper - 1e-3)[np.newaxis], 50, axis=0)
+    assert check(Motion.from_cycles(q), FR3, distance=None).ok
+    q[1:] += np.spacing(q[0].astype(np.float32)) / 2.0  # As a client that has the angles from the state.
+    assert "joint.velocity" not in {v.condition.id for v in check(Motion.from_cycles(q), FR3, distance=None).violations}
+    q[2:] += 4e-7
+    assert "joint.velocity" in {v.condition.id for v in check(Motion.from_cycles(q), FR3, distance=None).violations}
 
 
 def test_other_arms_have_the_same_bound_everywhere() -> None:

@@ -6,7 +6,8 @@ for Cartesian ones; they are applied to joints, too. The page "Errors" names the
 Differences are backward differences over 1 ms there as well.
 
 The FR3 has the Panda's rows with three differences. Its velocity bounds decrease towards the ends of the joints'
-ranges; they are those at the last commanded angles, which its clients compute from its state. A commanded angle out of
+ranges, to zero; they are those at the last commanded angles, which its clients compute from its state, and at least
+the velocity that its rounding gives a standing joint. A commanded angle out of
 range raises the error of a measured one. And its state has single precision: a client whose rate limiter starts from
 the commanded values in it is off by their rounding, which the bounds of accelerations, jerks, torque rates and first
 commands allow.
@@ -298,7 +299,7 @@ def _fr3_row(row: Condition) -> Condition:
     """Returns a row of the Panda in the FR3's form: the rule is that of the same page, its numbers are not."""
     name = row.id.removeprefix("inverse.")
     if name == "joint.velocity":
-        source = f"{_FR3_PAGE}; {_FR3_URDF}; {_ERRORS}"
+        source = f"{_FR3_PAGE}; {_FR3_URDF}; {_ERRORS} (at least the rounding of the state: rcilab)"
         return replace(row, formula="dq_min(q) < dq_c < dq_max(q)", source=source)
     if row.is_measured or row.stage != "throughout" or not (row.order or name in _OF_URDF):
         return row

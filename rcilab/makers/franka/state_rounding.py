@@ -9,15 +9,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.limits import JointLimits, Limits
 
 # Half a unit in the last place of a float, and up to 1 % more for that of velocities.
-_ANGLES = np.array([1.2e-7, 6e-8, 1.2e-7, 1.2e-7, 1.2e-7, 2.4e-7, 1.2e-7])  # [rad] Below 4; joint 2: 2, joint 6: 8.
-_ELBOW = float(_ANGLES[2])  # [rad] It is joint 3.
+ANGLE_ROUNDING = readonly_copy([1.2e-7, 6e-8, 1.2e-7, 1.2e-7, 1.2e-7, 2.4e-7, 1.2e-7])
+"""[rad] Below 4; joint 2: 2, joint 6: 8."""
+_ELBOW = float(ANGLE_ROUNDING[2])  # [rad] It is joint 3.
 _TOOL = 1.1e-7  # [m], [rad] Norm of the roundings of a position below 2 m, or of an orientation.
 _TORQUE = 3.9e-6  # [N m] Below 128.
 
@@ -48,8 +47,8 @@ def joint_limits_with_state_rounding(joint: JointLimits) -> JointLimits:
     """Returns the limits of the joints; see `with_state_rounding`."""
     return replace(
         joint,
-        acceleration=readonly_copy(joint.acceleration + _ANGLES / CYCLE_TIME**2),
-        jerk=readonly_copy(joint.jerk + _ANGLES / CYCLE_TIME**3),
+        acceleration=readonly_copy(joint.acceleration + ANGLE_ROUNDING / CYCLE_TIME**2),
+        jerk=readonly_copy(joint.jerk + ANGLE_ROUNDING / CYCLE_TIME**3),
         torque_rate=readonly_copy(joint.torque_rate + _TORQUE / CYCLE_TIME),
     )
 

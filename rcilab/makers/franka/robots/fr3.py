@@ -8,9 +8,11 @@ which is Craig's frame of its joint. They were identified on arms: single figure
 from __future__ import annotations
 
 from rcilab.core.arrays import readonly_copy
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.limits import EndVelocity
 from rcilab.makers.franka.conditions import fr3_conditions
 from rcilab.makers.franka.robots.arm import build_franka, craig_link, franka_limits
+from rcilab.makers.franka.state_rounding import ANGLE_ROUNDING
 
 LIMITS = "Franka's page Control parameters, limits for Franka Research 3"
 URDF = "URDF that an FR3 sends to its clients (that of the tests of the maker's client library)"
@@ -27,6 +29,7 @@ _TABLE = {
 _NEAR_ENDS = EndVelocity(
     offset=readonly_copy([0.30, 0.20, 0.20, 0.30, 0.35, 0.35, 0.35]),
     deceleration=readonly_copy([6.0, 2.585, 3.5, 4.0, 17.0, 5.5, 17.0]),
+    rounding=readonly_copy(ANGLE_ROUNDING / CYCLE_TIME),
 )
 
 _BODIES = (  # Mass, centre, tensor.
