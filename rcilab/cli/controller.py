@@ -314,7 +314,7 @@ def _config(options: Mapping[str, Any]) -> ControllerConfig:
         fresh=option("fresh", False),
         generation=option("generation"),
         limit_table=option("limits"),
-        force_sign=option("force_sign", "on-arm"),
+        force_sign=option("force_sign"),
         start=_parsed(option("start"), lambda text: parse_joints(text, n)),
         tool=tool,
         load=load,

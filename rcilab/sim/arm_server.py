@@ -223,7 +223,7 @@ class ArmServer:
             "realism": config.realism,
             "lockstep": config.lockstep,
         }
-        if config.force_sign != "on-arm":  # Not every maker leaves it open.
+        if config.force_sign is not None:
             settings["force_sign"] = config.force_sign
         self._capture = CycleCapture(
             self.ring,

@@ -122,8 +122,9 @@ class ControllerConfig:
     limit_table: str | None = None
     """Whose Cartesian limits commands are checked against: "manual", or "sdk" for those of the vendor's library; None:
     the maker's default."""
-    force_sign: ForceSign = "on-arm"
-    """Sign of `tau_ext_in_base` and `tau_ext_in_stiff`. That of a real arm is not verified: the manual does not say."""
+    force_sign: ForceSign | None = None
+    """Sign of `tau_ext_in_base` and `tau_ext_in_stiff`; None: on-arm. That of a real arm is not verified: the manual does
+    not say."""
     start: Floats | None = None
     """Joint angles at power-up, shape (n,), [rad]; None: the home pose of the arm."""
     tool: Pose | None = None
@@ -169,7 +170,7 @@ class ControllerConfig:
         if not self.host:
             raise InvalidValueError("host", self.host, "is not a valid address; use 127.0.0.2 for this machine only")
         require_plant(self.plant, self.realism)
-        if self.force_sign not in FORCE_SIGNS:
+        if self.force_sign is not None and self.force_sign not in FORCE_SIGNS:
             raise InvalidValueError("force_sign", self.force_sign, f"is unknown; known: {', '.join(FORCE_SIGNS)}")
         if self.log_format not in LOG_FORMATS:
             raise InvalidValueError("log_format", self.log_format, f"is unknown; known: {', '.join(LOG_FORMATS)}")

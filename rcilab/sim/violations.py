@@ -14,6 +14,8 @@ class ArmCondition(Enum):
     """Conditions of the virtual arm of every maker. The maker's controller maps each to one of its faults."""
 
     FINITE_ANGLES = "commanded joint angles are finite numbers"
+    FINITE_VELOCITIES = "commanded joint velocities are finite numbers"
+    FINITE_TWIST = "a commanded velocity of the tool is finite numbers"
     FINITE_TORQUES = "commanded joint torques are finite numbers"
     VALID_POSE = "a commanded pose is a pose that the arm can reach without a singularity"
     ARM_ANGLE_RANGE = "a commanded arm angle is within one turn"

@@ -223,8 +223,8 @@ def test_a_value_that_cannot_be_names_its_option_or_its_key(
 @pytest.mark.parametrize("model", ["FR3", "RM65"])
 @pytest.mark.parametrize(
     "option",
-    ["--on-loss hold", "--auto-limit", "--force-sign by-arm", "--mode-delay 0.2"],
-    ids=lambda text: text.split()[0],
+    ["--on-loss hold", "--auto-limit", "--force-sign by-arm", "--force-sign on-arm", "--mode-delay 0.2"],
+    ids=lambda text: text.replace(" ", "="),
 )
 def test_an_option_that_the_controller_of_an_arm_has_not_is_refused(
     capsys: pytest.CaptureFixture[str], model: str, option: str

@@ -3,10 +3,12 @@ from __future__ import annotations
 import json
 from importlib import import_module
 
+import numpy as np
 import pytest
 
 from rcilab.cli import main
 from rcilab.cli.bench import BENCHES
+from rcilab.diagnostics.bench.franka import summarise_period
 from rcilab.diagnostics.bench.rows import ROWS
 
 KEYS = {"name", "median", "p99", "unit", "target", "ok", "note"}
@@ -62,3 +64,16 @@ def test_the_loop_streams_and_reports_every_figure(capsys: pytest.CaptureFixture
     assert found["name"] == "control_loop"
     for figure in ("p50", "p99", "p99.9", "max", "late by more than 1 ms", "lost", "success rate"):
         assert figure in found["note"]
+
+
+@pytest.mark.parametrize(
+    ("mean", "latest", "is_ok"), [(1e-3, 1.05e-3, True), (1.002e-3, 1.05e-3, False), (1e-3, 1.2e-3, False)]
+)
+def test_the_period_of_an_fr3_has_targets_for_its_mean_and_its_latest_states(
+    mean: float, latest: float, is_ok: bool
+) -> None:
+    periods = np.full(10_000, mean)
+    periods[::500], periods[1::500] = latest, 2.0 * mean - latest
+    found = summarise_period(periods, "a note")
+    assert (found.target, found.ok) == (1000.0, is_ok)
+    assert found.note.endswith("while moving; a note")

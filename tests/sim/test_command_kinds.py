@@ -133,7 +133,7 @@ def test_twenty_lost_velocities_end_the_motion() -> None:
 def test_a_velocity_that_is_not_finite_is_a_condition_of_the_arm() -> None:
     arm = following(CommandKind.JOINT_VELOCITIES)
     result = arm.step(ArmCommand(0, dq=speed_of(1, math.nan)))
-    assert conditions(result.command_violations) == {ArmCondition.FINITE_ANGLES}
+    assert conditions(result.command_violations) == {ArmCondition.FINITE_VELOCITIES}
 
 
 # Twists

@@ -25,7 +25,7 @@ class Measurement:
     p99: float
     unit: Unit
     target: float | None
-    """Target, in `unit`: the largest median, or the smallest of a rate; None without a target."""
+    """Target, in `unit`: the largest median, the smallest of a rate, or the mean of a period; None without a target."""
     ok: bool | None
     """Whether the target is met; None without a target."""
     note: str = ""

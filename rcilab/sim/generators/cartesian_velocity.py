@@ -14,15 +14,15 @@ from math import cos, hypot, isfinite, remainder, sin, tau
 
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.spatial import Pose, rotation_from_wxyz
-from rcilab.i18n.translator import Remark
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.command_extrapolator import CommandExtrapolator
 from rcilab.sim.filters import LowPass
-from rcilab.sim.generators.generator import GeneratorOutput, MissedCycles
+from rcilab.sim.generators.generator import GeneratorOutput, MissedCycles, not_finite
 from rcilab.sim.generators.motion_limits import MotionLimits
-from rcilab.sim.generators.pose_reference import PoseReference, invalid_pose
+from rcilab.sim.generators.pose_reference import PoseReference
 from rcilab.sim.generators.rate_extrapolator import RateExtrapolator
 from rcilab.sim.jitter_buffer import Playback
+from rcilab.sim.violations import ArmCondition
 
 _ORIGIN = (0.0, 0.0, 0.0)
 
@@ -57,8 +57,7 @@ class CartesianVelocityGenerator:
             return GeneratorOutput(violations=(violation,))
         twist = self._stream.step(None if command is None else command.twist, playback.steps)
         if not isfinite(sum(twist)):
-            reason = Remark(f"commanded twist {twist} m/s, rad/s is not six finite numbers", "no_pose")
-            return invalid_pose(reason)
+            return not_finite(ArmCondition.FINITE_TWIST, "velocities of the tool", twist, "m/s, rad/s")
         psi = self._next_psi(playback)
         if not self._has_begun:
             self._has_begun = True

@@ -45,7 +45,7 @@ class JointVelocityGenerator:
         sent = None if playback.command is None else playback.command.dq[: self._n]
         dq = self._stream.step(sent, playback.steps)
         if not isfinite(sum(dq)):
-            return not_finite(ArmCondition.FINITE_ANGLES, "velocities", dq, "rad/s")
+            return not_finite(ArmCondition.FINITE_VELOCITIES, "velocities", dq, "rad/s")
         dq = self._filter.step(dq)
         self._q = [angle + CYCLE_TIME * rate for angle, rate in zip(self._q, dq, strict=True)]
         return self._reference.step(self._q, cycles)

@@ -9,6 +9,8 @@ from rcilab.makers.franka.errors import FrankaError
 from rcilab.sim.violations import ArmCondition, ArmViolation, CycleViolation
 
 _ARM_ERRORS = {
+    ArmCondition.FINITE_VELOCITIES: FrankaError.JOINT_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION,
+    ArmCondition.FINITE_TWIST: FrankaError.CARTESIAN_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION,
     ArmCondition.FINITE_TORQUES: FrankaError.CONTROLLER_TORQUE_DISCONTINUITY,
     ArmCondition.VALID_POSE: FrankaError.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME_FLAG,
     ArmCondition.ARM_ANGLE_RANGE: FrankaError.CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION,

@@ -42,7 +42,7 @@ def build_rci_server(arm: VirtualArm, config: ControllerConfig) -> RciServer:
     controller = RciController(
         arm,
         mode_delay=config.mode_delay_cycles,
-        force_sign=config.force_sign,
+        force_sign=config.force_sign or "on-arm",
         coulomb=[joint.friction for joint in joints] if joints and config.realism == "real" else None,
     )
     controller.auto_limit = config.auto_limit

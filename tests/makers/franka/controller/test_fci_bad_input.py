@@ -212,6 +212,27 @@ def test_a_number_that_is_none_in_any_field_ends_the_motion_and_in_other_fields_
         assert all(math.isfinite(value) for name in last.names for value in getattr(last, name))
 
 
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(
+    ("generator", "field", "error"),
+    [
+        (wire.JOINT_POSITION, "q", None),
+        (wire.JOINT_VELOCITY, "dq", "joint_motion_generator_velocity_limits_violation"),
+        (wire.CARTESIAN_POSE, "pose", "cartesian_position_motion_generator_invalid_frame_flag"),
+        (wire.CARTESIAN_VELOCITY, "twist", "cartesian_motion_generator_velocity_limits_violation"),
+    ],
+)
+def test_a_number_that_is_none_raises_the_error_of_its_quantity(
+    robot: Robot, generator: int, field: str, error: str | None, number: float
+) -> None:
+    of_position = {5: "joint_motion_generator_position_limits_violation", 10: "joint_position_limits_violation"}
+    start = robot.move(wire.JOINT_IMPEDANCE, generator)
+    quiet = Output(q=start.q_d, dq=programs.ZERO, pose=start.O_T_EE_c, twist=(0.0,) * 6)
+    numbers = (*getattr(quiet, field)[:-1], number)
+    ending = robot.play(start, [quiet] * 3 + [quiet._replace(**{field: numbers})] * 3)
+    assert ending.state.errors == (error or of_position[robot.version],)
+
+
 def test_a_first_command_that_is_the_last_one_is_a_motion_of_length_zero(robot: Robot) -> None:
     start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
     robot.answer(start, Output(q=start.q_d), finished=True)
