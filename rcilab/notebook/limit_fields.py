@@ -17,6 +17,7 @@ from rcilab.core.errors import RcilabError
 from rcilab.core.limits import JointLimits
 from rcilab.i18n.translator import Message, Text
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
+from rcilab.makers.maker import capabilities_of
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.signal_fields import SendRequest
 from rcilab.notebook.state import LabState
@@ -63,14 +64,14 @@ class LimitFields:
             ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none")
         )
         is_there = explain_missing_part(state.model, "joints") is None
+        has_auto = "auto_limit" in capabilities_of(state.model).options
         rows = [
             block(soft(text("softlimits.hint"))),
             self._inside,
             shared_style_widget(ipywidgets.HBox, [self.send, self.whole]),
             self.message_box,
             self._answers,
-            self.auto,
-            block(soft(text("softlimits.note"))),
+            *([self.auto, block(soft(text("softlimits.note")))] if has_auto else ()),
         ]
         self.folder: Any = shared_style_widget(
             ipywidgets.Accordion,

@@ -203,6 +203,20 @@ def test_the_lessons_on_two_makers_move_an_arm_of_each() -> None:
     ]
 
 
+def test_the_lesson_on_modes_shows_what_each_mode_refuses_and_what_ends_the_queue() -> None:
+    said = printed(run_lesson(LESSONS[12]))
+    rows = re.findall(r"^(\w+) +((?:\d +){6}\d)$", said, re.MULTILINE)
+    taken = {name: [k for k, code in enumerate(codes.split()) if code == "0"] for name, codes in rows}
+    assert taken == {
+        "set_servo_angle": [0, 5], "set_position": [0, 6], "set_servo_angle_j": [1], "set_servo_cartesian": [1],
+        "vc_set_joint_velocity": [3], "vc_set_cartesian_velocity": [4],
+    }  # fmt: skip
+    assert {code for _, codes in rows for code in codes.split()} == {"0", "9"}
+    ends = re.findall(r"^(set_\w+\(\d\)) +state (\d), (\d) motions", said, re.MULTILINE)
+    assert ends == [("set_state(4)", "4", "0"), ("set_state(6)", "4", "0"), ("set_mode(1)", "5", "0")]
+    assert "error 21 - " in said
+
+
 @pytest.mark.parametrize("path", LESSONS[10:12], ids=lambda path: path.stem)
 def test_a_lesson_on_two_makers_runs_without_the_libraries_of_franka(path: Path) -> None:
     import nbformat

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from contextlib import ExitStack
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -317,3 +318,20 @@ def test_soft_limits_and_auto_limit_are_set_and_count_in_plan_and_check(is_own: 
         limits.fields[0][0].box.value, limits.fields[0][1].box.value = "20", "10"
         limits.send.click()
         assert "20.0° to 10.0° is not a range" in limits.message_box.value
+
+
+@pytest.mark.skipif(find_spec("xarm") is None, reason="the extra xarm is not installed")
+def test_an_emergency_stop_that_is_an_error_is_recovered_from_and_foreign_settings_are_left_out() -> None:
+    with ExitStack() as stack:
+        panel = stack.enter_context(notebook.RunPanel(rcilab.load_model("xArm6")))
+        assert panel.limits.auto not in panel.limits.folder.children[0].children
+        panel.connect.click()
+        power_on(panel)
+        host, _, port = panel.state.robot.status().world_address.partition(":")
+        world = stack.enter_context(SimulationControl(host, int(port)))
+        world.press("estop")
+        wait_for(lambda: phase(panel) == "fault" and panel.state.status.is_pressed, what="the stop")
+        world.press("none")
+        wait_for(lambda: not panel.recover.disabled, what="the way out")
+        panel.recover.click()
+        wait_for(lambda: phase(panel) == "idle" and panel.state.status.powered, what="a ready arm")
