@@ -1,4 +1,4 @@
-"""A lab for ROKAE xMate arms: see every limit before anything moves, then run it at 1 kHz.
+"""A lab for arms of ROKAE, Franka, UFACTORY and RealMan: see every limit before anything moves, then run it.
 
 The names below are the ones a notebook needs; each is loaded when it is first used.
 """

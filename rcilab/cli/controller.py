@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from rcilab.sim.controller_config import ControllerConfig
 
 DESCRIPTION = """\
-Runs the virtual controller of an arm. Any client of the maker's interface can connect to it: this package, or a C++
-program that uses the vendor's client library. It prints one line when it is ready, a second one with the address of its
-simulation port, and ends on Ctrl-C.
+Runs the virtual controller of an arm of ROKAE, Franka, UFACTORY or RealMan. Any client of the maker's interface can
+connect to it: this package, or a program in C++ or Python that uses the maker's client library. It prints one line when
+it is ready, a second one with the address of its simulation port, and ends on Ctrl-C.
 
 --lockstep runs your unmodified program at the speed of the machine, several times real time, and loses no command at a
 breakpoint or on a busy machine. FILE, or the options below, start the arm where yours stands.
@@ -88,7 +88,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "file", nargs="?", type=Path, default=None, metavar="FILE", help="configuration of the arm, such as my_arm.toml"
     )
-    parser.add_argument("--model", metavar="NAME", help="arm, such as xMatePro7; required here or in the file")
+    parser.add_argument(
+        "--model", metavar="NAME", help="arm, such as xMatePro7, FR3, xArm6 or RM65; required here or in the file"
+    )
     parser.add_argument("--host", metavar="ADDR", help=f"address to listen on ({_HOST})")
     parser.add_argument(
         "--port", type=int, metavar="N", help="TCP port (default: that of the interface, RCI: 1337); 0: any free one"
@@ -114,20 +116,22 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--mode-delay",
         type=float,
         metavar="S",
-        help="delay from StartMove to the new mode (1.05, for any client; lock-step: 0.02; 0.2 is enough for most)",
+        help="delay from StartMove to the new mode (xMate only: 1.05, for any client; lock-step: 0.02; 0.2 is enough "
+        "for most)",
     )
     parser.add_argument(
         "--prefill",
         type=int,
         metavar="N",
-        help="delay commands by N cycles, which absorbs jitter (10, lock-step: 0; torques 2 in both)",
+        help="delay commands by N cycles, which absorbs jitter (xMate: 10, lock-step: 0, torques 2 in both; Franka: 0, "
+        "it waits for commands, see --patience; the controllers of UFACTORY and RealMan delay nothing)",
     )
     parser.add_argument(
         "--patience",
         type=float,
         metavar="S",
-        help="wait up to S for the command of a cycle before it counts as lost (by the clock: 0 for xMate; lock-step: "
-        "60, 0.05 with --corrupt); time then slips instead",
+        help="wait up to S for the command of a cycle before it counts as lost (by the clock: 0 for xMate, 0.02 for "
+        "Franka; lock-step: 60, 0.05 with --corrupt); time then slips instead",
     )
     parser.add_argument(
         "--lost-limit",
@@ -140,7 +144,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--on-loss",
         metavar="NAME",
-        help="while commands are missing: hold the last one, as a real arm does, or bridge the gap (hold)",
+        help="while commands are missing: hold the last one, as a real arm does, or bridge the gap (xMate only: hold)",
     )
     parser.add_argument(
         "--auto-limit",
@@ -163,7 +167,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--force-sign",
         metavar="SIGN",
         help="sign of reported external forces: on-arm, as exerted on the arm, or by-arm, as exerted by it "
-        "(on-arm; that of a real arm is not verified)",
+        "(xMate only: on-arm; that of a real arm is not verified)",
     )
     parser.add_argument(
         "--log-format", metavar="FORMAT", help="lines of the log on stderr: text, or json for one object each (text)"

@@ -123,8 +123,8 @@ class ControllerConfig:
     """Whose Cartesian limits commands are checked against: "manual", or "sdk" for those of the vendor's library; None:
     the maker's default."""
     force_sign: ForceSign | None = None
-    """Sign of `tau_ext_in_base` and `tau_ext_in_stiff`; None: on-arm. That of a real arm is not verified: the manual does
-    not say."""
+    """Sign of `tau_ext_in_base` and `tau_ext_in_stiff`; None: on-arm. That of a real arm is not verified: the manual
+    does not say."""
     start: Floats | None = None
     """Joint angles at power-up, shape (n,), [rad]; None: the home pose of the arm."""
     tool: Pose | None = None

@@ -3,7 +3,7 @@
 A session itself refuses a motion that does not begin where the arm is; those errors have no scenario.
 
 Commanded poses are those of an arm of which one joint moves, so that the tool or that joint exceeds its bound first.
-The elbow is commanded to the Panda only: the FR3's client library cannot command it.
+The elbow is commanded to the Panda only: pylibfranka, which drives the FR3, cannot command it.
 """
 
 from __future__ import annotations
