@@ -17,6 +17,10 @@ from rcilab.sim.planner.target import JointSpeed
 
 _STANDSTILL = (1e-9, 1e-6)  # [rad/s], [rad/s^2] Rounding of the curve.
 _THERE = 1e-7  # [rad] ruckig reaches a goal within 1e-8.
+_NEAR = 1e-6  # [rad] From the streamed angles: beyond it the joints catch up with them.
+_ROUNDING = 1e-12  # [rad], [rad/s].
+_LEAST_SPEED = 0.01  # Of the largest one, by which a joint at that speed still catches up; a tuning value.
+_STOP_ROOM = 2.0  # By which a stop with small jerk is longer than one with constant deceleration; a tuning value.
 _FASTEST = JointSpeed()
 
 
@@ -138,6 +142,7 @@ class StreamMover:
         self._velocity: list[float] = bounds.velocity.tolist()
         self._filter = StreamFilter(state.q, "direct", 0.0)
         self.target = list(state.q)
+        self._line_velocity = [0.0] * len(state.q)
         self._past: list[list[float]] = []  # The last angles, the newest first, while they are smoothed.
 
     @property
@@ -176,11 +181,55 @@ class StreamMover:
         if self.is_stationary:
             return list(self._axes.q)
         q = self._filter.step()
-        if self._filter.mode == "direct" or not self._takes(q):
+        if self._filter.mode == "linear":
+            if not self._stays_on_line(q, self._filter.velocity):
+                self._step_along(q, self._velocities_through(q))
+        elif self._filter.mode == "direct" or not self._takes(q):
             self._axes.step_to_positions(q, self._velocity)
         q = list(self._axes.q)
         self._past = [q, *self._past[:2]]
         return q
+
+    def _stays_on_line(self, q: Sequence[float], dq: list[float]) -> bool:
+        """Advances to these angles if the joints are next to them and may follow; returns whether they are."""
+        axes, h = self._axes, CYCLE_TIME
+        ddq = [(new - old) / h for new, old in zip(dq, self._line_velocity, strict=True)]
+        self._line_velocity = dq
+        for goal, v, a, x, v_max, a_max in zip(q, dq, ddq, axes.q, self._velocity, self._bounds[0], strict=True):
+            if abs(goal - x - h * v) > _NEAR or abs(v) > v_max or abs(a) > a_max:
+                return False
+        if any(abs(v - old) > a_max * h for v, old, a_max in zip(dq, axes.dq, self._bounds[0], strict=True)):
+            return False
+        axes.set_state(q, [v + 0.5 * h * a for v, a in zip(dq, ddq, strict=True)], ddq)
+        return True
+
+    def _step_along(self, q: Sequence[float], dq: Sequence[float]) -> None:
+        """Advances to angles that themselves move with these velocities, and catches up with them.
+
+        In axes that move along, they are a standing target.
+        """
+        axes, h = self._axes, CYCLE_TIME
+        behind = [_without_rounding(x - (goal - h * v)) for x, goal, v in zip(axes.q, q, dq, strict=True)]
+        slower = [_without_rounding(x - v) for x, v in zip(axes.dq, dq, strict=True)]
+        bounds = [
+            max(v_max - v if x < 0.0 else v_max + v, _LEAST_SPEED * v_max)
+            for x, v, v_max in zip(behind, dq, self._velocity, strict=True)
+        ]
+        axes.set_state(behind, slower, axes.ddq)
+        axes.step_to_positions([0.0] * len(q), bounds)
+        angles = [goal + x for goal, x in zip(q, axes.q, strict=True)]
+        axes.set_state(angles, [v + x for v, x in zip(dq, axes.dq, strict=True)], axes.ddq)
+
+    def _velocities_through(self, q: Sequence[float]) -> list[float]:
+        """Returns the velocities of the streamed angles, zero where a joint could not stop inside its range."""
+        limits = self._limits
+        found: list[float] = []
+        for x, v, v_max, a_max, low, high in zip(
+            q, self._filter.velocity, self._velocity, self._bounds[0], limits.lower, limits.upper, strict=True
+        ):
+            stop = x + _STOP_ROOM * v * abs(v) / (2.0 * a_max)
+            found.append(min(max(v, -v_max), v_max) if low < stop < high else 0.0)
+        return found
 
     def _takes(self, q: Sequence[float]) -> bool:
         """Advances to these angles if that is inside the bounds by differences; returns whether it is.
@@ -199,6 +248,11 @@ class StreamMover:
             ddq.append(a + jerk * h)
         self._axes.set_state(q, dq, ddq)
         return True
+
+
+def _without_rounding(x: float) -> float:
+    """Returns zero for a difference that is rounding, from which ruckig finds no curve."""
+    return 0.0 if abs(x) < _ROUNDING else x
 
 
 def _state_of(axes: _ruckig.Stepper) -> MotionState:

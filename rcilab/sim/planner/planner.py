@@ -291,11 +291,14 @@ class Planner:
         _require_speed(speed, self._arm.model.n)
         return self._move_by_velocity(lambda mover: mover.set_twist(desired, speed, frame, duration))
 
-    def servo_joints(self, q: Sequence[float], *, velocity: float | None = None) -> Refusal | None:
+    def servo_joints(
+        self, q: Sequence[float], *, mode: StreamMode = "direct", velocity: float | None = None
+    ) -> Refusal | None:
         """Moves every joint by itself to the newest angles, with the largest acceleration and jerk.
 
         Args:
             q: n finite numbers, [rad].
+            mode: "direct", or "linear" for a stream that is followed one period later.
             velocity: Of every joint, above zero, [rad/s]; None: the limits.
 
         Returns:
@@ -304,13 +307,21 @@ class Planner:
         Raises:
             InvalidValueError: q is not n finite numbers, or the velocity is not valid.
         """
-        return self.follow_joints(q, velocity=velocity)
+        return self.follow_joints(q, mode=mode, velocity=velocity)
 
-    def servo_tool(self, pose: Pose, *, velocity: float | None = None, max_step: float | None = None) -> Refusal | None:
+    def servo_tool(
+        self,
+        pose: Pose,
+        *,
+        mode: StreamMode = "direct",
+        velocity: float | None = None,
+        max_step: float | None = None,
+    ) -> Refusal | None:
         """Moves every joint by itself to the angles of the newest pose, as `servo_joints`.
 
         Args:
             pose: Pose of the tool in base.
+            mode: As for `servo_joints`.
             velocity: Of every joint, above zero, [rad/s]; None: the limits.
             max_step: Largest distance from the last pose, [m]; None: any.
 
@@ -320,7 +331,7 @@ class Planner:
         Raises:
             InvalidValueError: The velocity is not valid.
         """
-        return self.follow_tool(pose, velocity=velocity, max_step=max_step)
+        return self.follow_tool(pose, mode=mode, velocity=velocity, max_step=max_step)
 
     def follow_joints(
         self,

@@ -8,10 +8,14 @@ from typing import Literal, TypeAlias
 
 from rcilab.core.clock import CYCLE_TIME
 
-StreamMode: TypeAlias = Literal["direct", "fit", "filter"]
-"""How streamed angles are followed: as they come; on a curve through them, one period later; or low-pass filtered."""
+StreamMode: TypeAlias = Literal["direct", "linear", "fit", "filter"]
+"""How streamed angles are followed: to standstill at each; on straight lines through them that are rounded over a
+period, or on a curve, one period later; or low-pass filtered."""
 
 _LONGEST_TIME = 0.1  # [s] Time constant of the filter, and length of the mean over the curve, at smoothing 1; tuned.
+_MOST_STEPS = 3.0  # Which the joints may be behind the newest target.
+_KEPT = 0.9  # Share of a delay that a line to the next target keeps; a tuning value.
+_MEAN_OF = 16  # Intervals in the mean period; a tuning value.
 _LONGEST_PERIOD = 100  # [cycles] A client that streams more slowly is not streaming.
 
 
@@ -36,6 +40,13 @@ class StreamFilter:
         self._sum = [window * x for x in q]
         self._points = [list(q)] * 4  # Through which the curve goes; it is between the second and the third.
         self._period, self._since = 1, 0
+        self._periods: deque[int] = deque(maxlen=_MEAN_OF)
+        self._mean_period = 1.0  # [cycles] Of "linear", which irregular arrivals disturb less.
+        self._steps, self._duration = 1.0, 1.0  # Of the straight line, in targets and in cycles.
+        self._start, self._output = list(q), list(q)  # Of the straight line.
+        self._points_on_line = deque([list(q)], 2 * _LONGEST_PERIOD)
+        self._rounded = list(q)
+        self._velocity = [0.0] * len(self._target)
 
     @property
     def is_settled(self) -> bool:
@@ -44,12 +55,30 @@ class StreamFilter:
             return max(abs(a - b) for a, b in zip(self._second, self._target, strict=True)) < 1e-9
         if self.mode == "fit":
             return self._since > 4 * self._period + len(self._recent)
+        if self.mode == "linear":
+            return self._since > self._duration + self._mean_period + 1.0
         return True
+
+    @property
+    def velocity(self) -> list[float]:
+        """Velocities of the output of "linear", n plain floats, [rad/s]."""
+        return list(self._velocity)
 
     def take(self, q: Sequence[float]) -> None:
         """Takes the newest angles, n numbers, [rad]."""
         self._period = min(max(1, self._since), _LONGEST_PERIOD)
+        left = self._steps * max(0.0, 1.0 - self._since / self._duration)
+        if 0 < self._since < _LONGEST_PERIOD:
+            self._periods.append(self._since)
+            self._mean_period = sum(self._periods) / len(self._periods)
+        else:  # The first angles, to which the joints move at once.
+            self._periods.clear()
+            self._mean_period = 1.0
+        # A target that comes early does not make the joints faster: they still have a part of the last step to go.
+        self._steps = min(1.0 + left, _MOST_STEPS)
+        self._duration = self._mean_period * (1.0 + _KEPT * (self._steps - 1.0))
         self._since = 0
+        self._start = self._output
         self._target = list(q)
         self._points = [*self._points[1:], self._target]
 
@@ -57,9 +86,27 @@ class StreamFilter:
         """Returns the angles to follow in this cycle, n plain floats, [rad]."""
         if self.mode == "direct":
             return self._target
+        if self.mode == "linear":
+            self._since += 1
+            u = min(1.0, self._since / self._duration)
+            self._output = [a + u * (b - a) for a, b in zip(self._start, self._target, strict=True)]
+            return self._round(self._output)
         if self.mode == "filter":
             return self._filtered()
         return self._mean(self._on_curve())
+
+    def _round(self, q: list[float]) -> list[float]:
+        """Returns the mean of the straight lines over the last period, and notes its velocity."""
+        self._points_on_line.append(q)
+        window = min(max(1, round(self._mean_period)), len(self._points_on_line))
+        recent = list(self._points_on_line)[-window:]
+        before = self._rounded
+        self._rounded = q if self.is_settled else [sum(column) / window for column in zip(*recent, strict=True)]
+        is_streaming = self._mean_period > 1.0
+        self._velocity = [
+            (new - old) / CYCLE_TIME if is_streaming else 0.0 for new, old in zip(self._rounded, before, strict=True)
+        ]
+        return self._rounded
 
     def _filtered(self) -> list[float]:
         """Returns the output of two low-pass stages, whose input goes from one target to the next in a period."""

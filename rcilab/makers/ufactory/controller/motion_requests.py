@@ -214,11 +214,11 @@ def _servo(
         return Outcome(answer, is_dropped=True)
     if function is Function.SERVO_JOINT:
         q = _joints(controller, values)
-        controller.follow(task, partial(Planner.servo_joints, q=q))
+        controller.follow(task, partial(Planner.servo_joints, q=q, mode="linear"))
         controller.end.begin(q)
     else:
         pose = _servo_pose(controller, function, values)
-        controller.follow(task, partial(Planner.servo_tool, pose=pose, max_step=SERVO_STEP))
+        controller.follow(task, partial(Planner.servo_tool, pose=pose, mode="linear", max_step=SERVO_STEP))
         controller.end.move(pose)
     return Outcome(answer)
 

@@ -9,9 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.makers.ufactory.bounds import JOINT_ACCELERATION
 from rcilab.makers.ufactory.controller.modes import Answer, Command, Mode, State, answer, mode_table
 from rcilab.makers.ufactory.wire.frame import STATUS_ERROR, STATUS_INVALID, STATUS_NOT_READY, STATUS_WARNING
 from rcilab.makers.ufactory.wire.functions import Function
+from rcilab.motion import plan_joint
+from rcilab.sim.arm_setup import ArmSetup
+from rcilab.sim.controller_config import PlantKind
 from tests.makers.ufactory.controller.conftest import ALL, Q6, Arm
 
 AWAY = tuple(angle + 0.3 for angle in Q6)
@@ -260,6 +265,29 @@ def test_the_newest_servo_target_counts_at_180_degrees_per_second(arm: Arm) -> N
     arm.run()
     np.testing.assert_allclose(arm.q, near, atol=1e-6)
     assert max(speeds) == pytest.approx(np.pi, abs=5e-3)
+
+
+@pytest.mark.parametrize("jitter", [0, 1])
+@pytest.mark.parametrize("plant", ["ideal", "mujoco"])
+def test_a_stream_of_servo_targets_is_followed_one_to_three_periods_later(plant: PlantKind, jitter: int) -> None:
+    arm = Arm(plant=plant)
+    arm.controller.set_up(ArmSetup(q=Q6))
+    arm.ready(Mode.SERVO)
+    rows = plan_joint(arm.controller.model, Q6, np.add(Q6, (0.5, 0.1, 0.0, 0.3, 0.0, 0.0)), speed=0.3).q
+    late, reached, random = 0, [], np.random.default_rng(1)
+    for cycle in range(len(rows) + 200):
+        row = rows[min(cycle, len(rows) - 1)]
+        if cycle >= late:
+            arm.call(Function.SERVO_JOINT, "10f", *row, *NOTHING)
+            late = cycle + 5 + int(random.integers(-jitter, jitter + 1))
+        arm.step()
+        reached.append(arm.q)
+    speed = np.abs(np.diff(rows, axis=0)).max()  # Per cycle.
+    error = np.abs(np.array(reached)[: len(rows)] - rows).max()
+    assert error < (8.0 if jitter == 0 else 20.0) * speed
+    assert np.abs(np.diff(reached, 2, axis=0)).max() / CYCLE_TIME**2 < 1.05 * JOINT_ACCELERATION
+    np.testing.assert_allclose(reached[-1], rows[-1], atol=1e-5)
+    assert arm.error == (0, 0)
 
 
 def test_a_servo_pose_farther_than_10_mm_is_an_error(arm: Arm) -> None:
