@@ -35,16 +35,15 @@ class CallTimes:
 
     def describe(self) -> str:
         """Returns a message about a callback that delayed the loop, with advice; "" if it was fast enough."""
-        missed = int(self._slowest / CYCLE_TIME)
         if self._slow >= _OFTEN and 2 * self._slow > self._calls:
             mean = self._sum / self._calls
             return (
                 f"{self._slow} of {self._calls} calls of the callback took more than 1 ms, {1e3 * mean:.1f} ms on "
                 f"average, so that its commands were increasingly late; {_FASTER}"
             )
-        if missed < _LATE_CYCLES:
+        if self._slowest < _LATE_CYCLES * CYCLE_TIME:
             return ""
         return (
-            f"the callback took {1e3 * self._slowest:.1f} ms at t = {self._slowest_t:.3f} s, so that {missed} cycles "
+            f"the callback took {1e3 * self._slowest:.1f} ms at t = {self._slowest_t:.3f} s, and the cycles meanwhile "
             f"had no command in time; {_FASTER}"
         )

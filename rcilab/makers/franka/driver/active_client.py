@@ -15,8 +15,7 @@ from rcilab.core.state import ControllerMode, RobotMode
 from rcilab.makers.franka.bounds import SINGLE_PRECISION
 from rcilab.makers.franka.driver.address import FciAddress
 from rcilab.makers.franka.driver.client import FciClient, columns_of
-from rcilab.makers.franka.driver.client_sockets import open_with_sockets
-from rcilab.makers.franka.driver.libraries import kept_scheduling, load_client_library
+from rcilab.makers.franka.driver.libraries import load_client_library
 
 VERSION = 10
 _STATE_SIZE = 1377  # [bytes]
@@ -31,6 +30,7 @@ class ActiveClient(FciClient):
 
     Raises:
         MissingExtraError: The library is not installed.
+        ConnectionLostError: No states arrive.
     """
 
     resolution = SINGLE_PRECISION
@@ -38,14 +38,7 @@ class ActiveClient(FciClient):
 
     def __init__(self, address: FciAddress) -> None:
         library = load_client_library(VERSION)
-        with kept_scheduling():
-            robot, sockets = open_with_sockets(
-                lambda: library.Robot(address.host, library.RealtimeConfig.kIgnore),
-                _STATE_SIZE,
-                address.port,
-                str(address),
-            )
-        super().__init__(robot, sockets)
+        super().__init__(library, address, _STATE_SIZE)
         self._library = library
         self._control: Any = None
         self._kind: Any = None

@@ -15,9 +15,9 @@ from rcilab.core.command import CartesianPosition, Command, JointPosition
 from rcilab.core.errors import ConnectionLostError
 from rcilab.core.state import ControllerMode
 from rcilab.makers.franka.driver.address import FciAddress
-from rcilab.makers.franka.driver.client import FciClient, columns_of
-from rcilab.makers.franka.driver.client_sockets import open_with_sockets
-from rcilab.makers.franka.driver.libraries import kept_scheduling, load_client_library
+from rcilab.makers.franka.driver.call_limit import CallLimit
+from rcilab.makers.franka.driver.client import ANSWER_TIMEOUT, FciClient, columns_of
+from rcilab.makers.franka.driver.libraries import load_client_library
 
 VERSION = 5
 _STATE_SIZE = 2373  # [bytes]
@@ -34,6 +34,7 @@ class CallbackClient(FciClient):
 
     Raises:
         MissingExtraError: The library is not installed.
+        ConnectionLostError: No states arrive.
     """
 
     resolution = 0.0
@@ -41,14 +42,7 @@ class CallbackClient(FciClient):
 
     def __init__(self, address: FciAddress) -> None:
         library = load_client_library(VERSION)
-        with kept_scheduling():
-            robot, sockets = open_with_sockets(
-                lambda: library.Robot(address.host, library.RealtimeConfig.kIgnore),
-                _STATE_SIZE,
-                address.port,
-                str(address),
-            )
-        super().__init__(robot, sockets)
+        super().__init__(library, address, _STATE_SIZE)
         self._library = library
         self._name = str(address)
         self._motion: _Motion | None = None
@@ -74,7 +68,7 @@ class CallbackClient(FciClient):
         control, *arguments = kinds[mode]
         self._mode, self._last = mode, None
         with self.request("Move"):
-            self._motion = _Motion(control, (*arguments, False, _NO_FILTER))
+            self._motion = _Motion(control, (*arguments, False, _NO_FILTER), self.sockets.limit)
             first = self._motion.next_state(_START_TIMEOUT)
             if first is None:
                 motion, self._motion = self._motion, None
@@ -159,9 +153,10 @@ class _Motion:
     Args:
         control: The method of the library.
         arguments: Its arguments after the callback.
+        limit: Time limit of the library's calls.
     """
 
-    def __init__(self, control: Any, arguments: tuple[Any, ...]) -> None:
+    def __init__(self, control: Any, arguments: tuple[Any, ...], limit: CallLimit) -> None:
         self.is_waiting = False
         self.failure: Exception | None = None
         self.unread: Any = None
@@ -169,6 +164,7 @@ class _Motion:
         self._commands: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._scheduling = os.sched_getscheduler(0), os.sched_getparam(0)
         self._is_first = True
+        self._limit = limit
         self._thread = threading.Thread(target=self._run, args=(control, arguments), name="libfranka", daemon=True)
         self._thread.start()
 
@@ -205,20 +201,24 @@ class _Motion:
         self._thread.join(timeout)
 
     def _run(self, control: Any, arguments: tuple[Any, ...]) -> None:
+        self._limit.start(ANSWER_TIMEOUT)
         try:
             control(self._exchange, *arguments)
         except Exception as error:
             self.failure = error
         finally:
+            self._limit.stop()
             self._states.put(None)
 
     def _exchange(self, state: Any, period: Any) -> Any:
         """The library's callback."""
+        self._limit.stop()
         if self._is_first:
             self._is_first = False
             os.sched_setscheduler(0, *self._scheduling)  # The library has requested the highest priority.
         self._states.put(state)
         command = self._commands.get()
+        self._limit.start(ANSWER_TIMEOUT)
         if command is None:
             raise _StopMoveError
         return command

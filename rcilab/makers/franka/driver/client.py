@@ -12,9 +12,14 @@ import numpy as np
 from rcilab.core.arrays import Matrix
 from rcilab.core.command import Command
 from rcilab.core.errors import CommandRejectedError, RcilabError
+from rcilab.core.spatial import as_pose
 from rcilab.core.state import ControllerMode
-from rcilab.makers.franka.driver.client_sockets import ClientSockets
+from rcilab.makers.franka.driver.address import FciAddress
+from rcilab.makers.franka.driver.client_sockets import open_with_sockets
+from rcilab.makers.franka.driver.libraries import kept_scheduling
 from rcilab.makers.franka.driver.state_reader import number_of
+
+ANSWER_TIMEOUT = 5.0  # [s] For the answer to a request, which a controller gives within a few cycles. A tuning value.
 
 
 class FciClient(ABC):
@@ -25,8 +30,12 @@ class FciClient(ABC):
         sockets: Its sockets.
 
     Args:
-        robot: See above.
-        sockets: See above.
+        library: The client library.
+        address: Address of the controller.
+        state_size: Size of its states, [bytes].
+
+    Raises:
+        ConnectionLostError: No states of an arm arrive.
     """
 
     robot: Any
@@ -35,10 +44,16 @@ class FciClient(ABC):
     commands_elbow: bool
     """Whether poses can be sent with the elbow."""
 
-    def __init__(self, robot: Any, sockets: ClientSockets) -> None:
-        self.robot = robot
-        self.sockets = sockets
-        self.newest = robot.read_once()
+    def __init__(self, library: Any, address: FciAddress, state_size: int) -> None:
+        def open_robot() -> tuple[Any, Any]:
+            robot = library.Robot(address.host, library.RealtimeConfig.kIgnore)
+            state = robot.read_once()
+            as_pose(np.array(state.O_T_EE).reshape(4, 4).T)  # Else it is not the state of an arm.
+            return robot, state
+
+        with kept_scheduling():
+            (self.robot, first), self.sockets = open_with_sockets(open_robot, state_size, address.port, str(address))
+        self.newest: Any = first
         """The newest state."""
 
     @property
@@ -84,14 +99,19 @@ class FciClient(ABC):
         """The same for the stiffness frame."""
 
     @contextmanager
-    def request(self, name: str) -> Iterator[None]:
+    def request(self, name: str, timeout: float = ANSWER_TIMEOUT) -> Iterator[None]:
         """Calls of the library for a request: their errors become those of rcilab.
 
+        Args:
+            name: Name of the request.
+            timeout: For its answer, [s].
+
         Raises:
-            ConnectionLostError: The controller has closed the connection.
+            ConnectionLostError: The controller has closed the connection, or does not answer in time.
             CommandRejectedError: The controller refuses the request; its text is that of the library.
         """
         self.sockets.require_open()
+        self.sockets.limit.start(timeout)
         try:
             yield
         except RcilabError:
@@ -99,6 +119,8 @@ class FciClient(ABC):
         except Exception as error:  # The libraries have no common base class, and panda-python no types.
             self.sockets.require_open()
             raise CommandRejectedError(name, str(error).removeprefix("libfranka: ")) from error
+        finally:
+            self.sockets.limit.stop()
 
 
 def columns_of(T: Matrix) -> list[float]:

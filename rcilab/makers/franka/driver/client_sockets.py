@@ -1,8 +1,8 @@
 """The sockets of a client library, to wait at them.
 
-The bindings of libfranka keep Python's global lock while they wait, without a time limit that could be set, and for
-answers of a controller that has closed the connection they wait forever. So a driver waits at duplicates of their
-sockets, and calls a library once what it reads is there. Nothing but outdated or foreign datagrams is read here.
+The bindings of libfranka keep Python's global lock while they wait. So a driver waits at duplicates of their sockets,
+and calls a library once what it reads is there. Nothing but outdated or foreign datagrams is read here. Answers of the
+controller are read by the calls that request them, whose time is limited from outside (`CallLimit`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from contextlib import suppress
 from typing import TypeVar
 
 from rcilab.core.errors import ConnectionLostError
+from rcilab.makers.franka.driver.call_limit import CallLimit
 
 Client = TypeVar("Client")
 
@@ -28,6 +29,9 @@ _MS = 1000.0
 class ClientSockets:
     """Duplicates of a client's two sockets. Owned by one thread.
 
+    Attributes:
+        limit: Time limit of the client's calls.
+
     Args:
         tcp: Connected to the controller.
         udp: Where states arrive.
@@ -36,6 +40,7 @@ class ClientSockets:
     """
 
     def __init__(self, tcp: socket.socket, udp: socket.socket, state_size: int, name: str) -> None:
+        self.limit = CallLimit(tcp)
         self._tcp, self._udp = tcp, udp
         self._state_size = state_size
         self._name = name
@@ -51,8 +56,10 @@ class ClientSockets:
         """Returns whether a state with a number above `after` has arrived within a timeout, [s].
 
         Raises:
-            ConnectionLostError: The controller has closed the connection.
+            ConnectionLostError: The controller has closed the connection, or a call was ended.
         """
+        if self.limit.has_ended:
+            raise self._lost()
         deadline = time.monotonic() + timeout
         while True:
             events = self._states_ready.poll(max(0.0, deadline - time.monotonic()) * _MS)
@@ -64,12 +71,12 @@ class ClientSockets:
                 return True
 
     def require_open(self) -> None:
-        """Checks that the controller has not closed the connection.
+        """Checks that the connection is open.
 
         Raises:
-            ConnectionLostError: It has.
+            ConnectionLostError: The controller has closed it, or has not answered a call in time.
         """
-        if self._is_open.poll(0):
+        if self.limit.has_ended or self._is_open.poll(0):
             raise self._lost()
 
     def abort(self) -> None:
@@ -79,6 +86,7 @@ class ClientSockets:
 
     def close(self) -> None:
         """Closes the duplicates. May be called twice."""
+        self.limit.close()
         self._tcp.close()
         self._udp.close()
 
@@ -96,9 +104,10 @@ class ClientSockets:
         return False
 
     def _lost(self) -> ConnectionLostError:
+        limit = self.limit
+        reason = f"it did not answer within {limit.seconds:g} s" if limit.has_ended else "it closed the connection"
         return ConnectionLostError(
-            f"{self._name}: the connection is lost (it closed the connection); look whether the controller runs, and "
-            "connect again"
+            f"{self._name}: the connection is lost ({reason}); look whether the controller runs, and connect again"
         )
 
 
@@ -114,10 +123,17 @@ def open_with_sockets(
         name: Name of the controller in errors.
 
     Raises:
-        ConnectionLostError: The client did not open a TCP and a UDP socket.
+        ConnectionLostError: The client raised an error, or did not open a TCP and a UDP socket.
     """
     before = _open_sockets().keys()
-    client = open_client()
+    try:
+        client = open_client()
+    except Exception as error:  # The libraries have no common base class.
+        raise ConnectionLostError(
+            f"{name}: the controller answers, but the client library cannot connect "
+            f"({str(error).removeprefix('libfranka: ')}); check that no firewall drops the datagrams (UDP) in which "
+            "its states arrive, and connect again"
+        ) from error
     tcp = udp = None
     for number in (fd for inode, fd in _open_sockets().items() if inode not in before):
         duplicate = socket.socket(fileno=os.dup(number))  # Its flags are the client's: they stay as they are.

@@ -21,6 +21,7 @@ from rcilab.makers.franka.errors import FrankaError
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
+_LONG_GAP = 0.02  # [s] Between states; the libraries keep the newest one only. A tuning value.
 _HELD = "error.run holds the motion"
 _REFLEXES = frozenset({FrankaError.JOINT_REFLEX, FrankaError.CARTESIAN_REFLEX})
 _OF_JOINTS = (
@@ -64,7 +65,7 @@ def describe_faults(
 ) -> FaultReport:
     """Returns the diagnosis of a motion's end; see `StreamingDriver.describe_faults`."""
     faults = tuple(faults)
-    when = "before the first command" if math.isnan(t) else f"at t = {t:.3f} s"
+    when = "before the first command" if math.isnan(t) else _describe_time(t, record)
     if pressed:
         return FaultReport(f"the controller stopped the motion {when}: {pressed}", _HELD, Remark(""))
     names = ", ".join(f"{fault.manual_name} ({fault.cause})" for fault in faults)
@@ -80,6 +81,14 @@ def describe_faults(
     parts = [f"the controller stopped the motion {when}: {names}", *found, advice]
     finding = Remark.all(part for part in found if isinstance(part, Remark))
     return FaultReport("; ".join(parts), f"recover() clears the fault; {_HELD}", finding)
+
+
+def _describe_time(t: float, record: NDArray[np.void]) -> str:
+    """Returns when a motion was stopped that a state at a time t, [s], shows as stopped."""
+    before = float(record["t"][-2]) if len(record) > 1 else t
+    if t - before < _LONG_GAP:  # Also if it is nan.
+        return f"at t = {t:.3f} s"
+    return f"between t = {before:.3f} s and {t:.3f} s (no state was read meanwhile)"
 
 
 def _describe_reflex(faults: tuple[FrankaError, ...], record: NDArray[np.void]) -> str:

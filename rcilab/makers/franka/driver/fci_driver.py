@@ -66,8 +66,8 @@ def open_driver(address: str, timeout: float, expected: ExpectedArm | None) -> F
 class FciDriver:
     """A connection to a Franka controller with the interface of `StreamingDriver`.
 
-    The client libraries keep the newest state only: while this process is late, states are lost. They wait for the
-    answer of a request without a time limit, and no state is read meanwhile.
+    The client libraries keep the newest state only: while this process is late, states are lost. No state is read while
+    they wait for the answer of a request.
 
     Args:
         client: The connection.

@@ -28,7 +28,7 @@ def find_version(address: FciAddress, version: int, timeout: float) -> int:
         timeout: For the connection and for the answer, [s].
 
     Raises:
-        ConnectionLostError: No controller answers, or it has another client.
+        ConnectionLostError: No controller answers in time, or it has another client.
     """
     route = find_route(address)
     start = time.monotonic()
@@ -49,14 +49,20 @@ def find_version(address: FciAddress, version: int, timeout: float) -> int:
                 "the joints are unlocked, that the IP address is the one shown there, and the cable; a virtual one is "
                 "started with, for example: rcilab controller --model FR3"
             ).coded("no_robot", address=str(address)) from error
+        deadline = time.monotonic() + timeout
         try:
             tcp.sendall(_CONNECT.pack(0, 0, _CONNECT.size, version, udp.getsockname()[1]))
-            answer = _receive(tcp, _ANSWER.size)
+            answer = _receive(tcp, _ANSWER.size, deadline)
             found = _ANSWER.unpack(answer)[-1]
             tcp.shutdown(socket.SHUT_WR)
             with suppress(TimeoutError):
-                while tcp.recv(4096):  # Until the controller is ready for the next client.
+                while _receive_some(tcp, 4096, deadline):  # Until the controller is ready for the next client.
                     pass
+        except TimeoutError as error:
+            raise ConnectionLostError(
+                f"{address}: what is there accepted the connection and did not answer within {timeout:g} s; check "
+                "that it is a Franka controller and that it has started, and connect again"
+            ) from error
         except OSError as error:
             raise ConnectionLostError(
                 f"{address}: the controller ended the connection before its first answer ({error.strerror or error}), "
@@ -65,11 +71,19 @@ def find_version(address: FciAddress, version: int, timeout: float) -> int:
     return found
 
 
-def _receive(tcp: socket.socket, size: int) -> bytes:
+def _receive(tcp: socket.socket, size: int, deadline: float) -> bytes:
     received = b""
     while len(received) < size:
-        piece = tcp.recv(size - len(received))
+        piece = _receive_some(tcp, size - len(received), deadline)
         if not piece:
             raise ConnectionResetError("it closed the connection")
         received += piece
     return received
+
+
+def _receive_some(tcp: socket.socket, size: int, deadline: float) -> bytes:
+    left = deadline - time.monotonic()
+    if left <= 0.0:
+        raise TimeoutError
+    tcp.settimeout(left)
+    return tcp.recv(size)

@@ -12,7 +12,7 @@ from rcilab.core.errors import ModelError
 from rcilab.core.spatial import Pose
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ConfiguredArm, RequestLock
-from rcilab.makers.franka.driver.client import FciClient
+from rcilab.makers.franka.driver.client import ANSWER_TIMEOUT, FciClient
 from rcilab.makers.franka.driver.configuration import send_configuration
 from rcilab.makers.franka.driver.settings import FciSettings, as_load
 from rcilab.model.dynamics.payload import POINT_MASS, combine_payloads
@@ -92,8 +92,8 @@ class FciSessionCommands(FciSettings):
         raise _missing("restart on request")
 
     @contextmanager
-    def _request(self, name: str) -> Iterator[None]:
-        with self._lock.acquire(name), super()._request(name):
+    def _request(self, name: str, timeout: float = ANSWER_TIMEOUT) -> Iterator[None]:
+        with self._lock.acquire(name), super()._request(name, timeout):
             yield
 
 

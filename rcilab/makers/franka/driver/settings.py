@@ -18,7 +18,7 @@ from rcilab.core.fault import name_faults
 from rcilab.core.spatial import IDENTITY, Pose, as_pose
 from rcilab.core.state import RobotMode
 from rcilab.makers.franka.bounds import CARTESIAN_STIFFNESS, LARGEST_JOINT_STIFFNESS, LONGEST_TOOL
-from rcilab.makers.franka.driver.client import FciClient, columns_of
+from rcilab.makers.franka.driver.client import ANSWER_TIMEOUT, FciClient, columns_of
 from rcilab.makers.franka.driver.state_reader import errors_of
 from rcilab.makers.setting_values import bounded_vector
 from rcilab.model.dynamics.payload import Payload
@@ -39,7 +39,8 @@ _REASONS = {
 """Why a request is refused: the key of its text, and the sentence."""
 _MASS_DIGITS = 6  # [kg] That single precision has of a load; 3 kg must not become more than the arm is rated for.
 _STATE_TIMEOUT = 1.0  # [s] For a state that shows a change; they come every millisecond.
-_RECOVERY_TIMEOUT = 3.0  # [s] For the error flags to clear after the controller has accepted the recovery.
+_RECOVERY_TIMEOUT = 20.0  # [s] For the answer to a recovery, which moves the arm back. A tuning value.
+_CLEAR_TIMEOUT = 3.0  # [s] For the error flags to clear after the controller has accepted the recovery.
 
 
 class FciSettings:
@@ -116,17 +117,17 @@ class FciSettings:
 
     def automatic_error_recovery(self) -> None:
         """Clears the errors and returns once they are gone."""
-        with self._request("automaticErrorRecovery"):
+        with self._request("automaticErrorRecovery", _RECOVERY_TIMEOUT):
             self._client.robot.automatic_error_recovery()
-        deadline = time.monotonic() + _RECOVERY_TIMEOUT
+        deadline = time.monotonic() + _CLEAR_TIMEOUT
         while time.monotonic() < deadline:
             self._client.poll(_STATE_TIMEOUT)
             if not errors_of(self._client.newest.current_errors):
                 return
         names = name_faults(errors_of(self._client.newest.current_errors))
         raise DeadlineError(
-            f"{self._name}: {names} did not clear within {_RECOVERY_TIMEOUT:g} s; remove the cause first"
-        ).coded("not_cleared", faults=names, seconds=f"{_RECOVERY_TIMEOUT:g}")
+            f"{self._name}: {names} did not clear within {_CLEAR_TIMEOUT:g} s; remove the cause first"
+        ).coded("not_cleared", faults=names, seconds=f"{_CLEAR_TIMEOUT:g}")
 
     def set_tool(self, T_flange_tool: Pose) -> None:
         """Sets the end effector by its pose in the flange frame."""
@@ -165,10 +166,10 @@ class FciSettings:
             raise ConnectionLostError(f"{self._name}: no state for {_STATE_TIMEOUT:g} s; connect again")
 
     @contextmanager
-    def _request(self, name: str) -> Iterator[None]:
+    def _request(self, name: str, timeout: float = ANSWER_TIMEOUT) -> Iterator[None]:
         """Calls for a request, as `FciClient.request`; the state gives the reason of a refusal."""
         try:
-            with self._client.request(name):
+            with self._client.request(name, timeout):
                 yield
         except CommandRejectedError as refusal:
             self._client.poll(0.0)

@@ -8,7 +8,9 @@ import socket
 import struct
 import sys
 import threading
+import time
 from collections.abc import Iterator
+from contextlib import suppress
 
 import pytest
 
@@ -106,6 +108,34 @@ def test_what_answers_there_and_is_no_controller_is_not_waited_for(monkeypatch, 
         with pytest.raises(ConnectionLostError, match="ended the connection before its first answer"):
             find_version(FciAddress(host="127.0.0.1"), 10, 2.0)
         thread.join()
+
+
+def test_a_controller_that_answers_too_slowly_is_not_waited_for(monkeypatch):
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        monkeypatch.setattr(FciAddress, "port", listener.getsockname()[1])
+
+        def serve() -> None:
+            peer, _ = listener.accept()
+            with peer, suppress(OSError):  # The client has left.
+                for byte in struct.pack("<IIIBH", 0, 0, 15, 0, 10):
+                    time.sleep(0.1)
+                    peer.send(bytes([byte]))
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        with pytest.raises(ConnectionLostError, match=r"accepted the connection and did not answer within 0\.5 s"):
+            find_version(FciAddress(host="127.0.0.1"), 10, 0.5)
+        thread.join()
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_states_that_do_not_arrive_are_a_matter_of_the_firewall(name):
+    controller = start_controller(name, options=("--loss", "1", "--faults-on", "states"))
+    try:
+        with pytest.raises(ConnectionLostError, match=r"fci://.* cannot connect \(UDP.*Timeout\); .*no firewall"):
+            connect(controller.address)
+    finally:
+        controller.end()
 
 
 @pytest.mark.parametrize(

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import re
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rcilab.conformance.check import check
+from rcilab.control_process.launch import start_controller
 from rcilab.control_process.simulate import simulate
 from rcilab.core.command import CartesianPosition, JointPosition, JointTorque
 from rcilab.core.errors import CommandRejectedError, ConformanceError, ControlError, InvalidValueError, UsageError
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, RobotMode
+from rcilab.execution.connect import connect
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
@@ -34,6 +38,29 @@ def test_a_checked_motion_arrives_and_its_run_has_every_cycle(robot):
     assert np.abs(robot.state.q_c - motion.q[-1]).max() <= ROUNDING
     sent = run.cycles["command"][np.isfinite(run.cycles["command"]).all(axis=1)]
     assert np.array_equal(sent[: len(motion.q)], motion.q)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_a_stop_during_a_long_call_is_in_the_span_without_states(name):
+    controller = start_controller(name, options=("--patience", "0.02"))
+    calls = []
+
+    def slow(state, t):
+        calls.append(t)
+        time.sleep(1.0 if len(calls) == 50 else 0.0)  # 20 cycles wait 0.02 s each: the arm stops in the middle of it.
+        return JointPosition(state.q_c)
+
+    try:
+        with connect(controller.address) as robot:
+            robot.power_on()
+            with pytest.raises(ControlError, match=r"between t = (\S+) s and (\S+) s \(no state was read") as caught:
+                robot.control(slow)
+    finally:
+        controller.end()
+    found = re.search(r"between t = (\S+) s and", str(caught.value))
+    assert found is not None
+    assert float(found[1]) == pytest.approx(calls[-1])
+    assert "and the cycles meanwhile had no command in time" in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ARMS)
