@@ -14,12 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.cli.output import print_interruptibly
 from rcilab.cli.signal_handlers import Handler, handled_signals
-from rcilab.core.errors import UsageError
+from rcilab.core.errors import ConnectionLostError, UsageError
 from rcilab.core.memory import OUT_OF_MEMORY, is_out_of_memory
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.app import WorkbenchConfig
+
+_FIRST_ARM = "xMatePro7"
+_TIMEOUT = 3.0  # [s] For the controller's answer; as for a session.
 
 
 def add_parser(subparsers: Any) -> None:
@@ -31,7 +34,7 @@ def add_parser(subparsers: Any) -> None:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Adds the options, for `rcilab workbench` and for a bare `rcilab`."""
-    parser.add_argument("--model", default="xMatePro7", help="initial arm (default: %(default)s)")
+    parser.add_argument("--model", help=f"initial arm (default: that of the robot; without one {_FIRST_ARM})")
     parser.add_argument(
         "--robot",
         default="virtual",
@@ -81,8 +84,31 @@ def run(args: argparse.Namespace) -> int:
     from rcilab.workbench.security import require_openable
 
     token = find_page_token(args)
-    require_openable(args.host, token, args.robot, args.model)  # Before the libraries of the page are loaded.
-    return serve(page_config(args, token, model=args.model, target=args.robot), browser=not args.no_browser)
+    model = _FIRST_ARM if args.model is None else args.model
+    if args.model is None and args.robot != "virtual":
+        model = _arm_at(args.robot)
+    require_openable(args.host, token, args.robot, model)  # Before the libraries of the page are loaded.
+    return serve(page_config(args, token, model=model, target=args.robot), browser=not args.no_browser)
+
+
+def _arm_at(address: str) -> str:
+    """Returns the name of the arm that a controller reports.
+
+    Raises:
+        ConnectionLostError: The controller does not answer.
+        ModelError: It does not report an arm that is known.
+        InvalidValueError: The address is not valid.
+    """
+    from rcilab.makers.driver import open_driver
+
+    try:
+        driver = open_driver(address, _TIMEOUT, None)
+    except ConnectionLostError as error:
+        raise ConnectionLostError(
+            f"{error}; to open the page before the controller answers, add --model NAME"
+        ) from error
+    driver.close()
+    return driver.arm_name
 
 
 def find_page_token(args: argparse.Namespace) -> str | None:

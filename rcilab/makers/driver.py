@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rcilab.core.arrays import JointVector, described
 from rcilab.core.command import Command, CommandFilter
-from rcilab.core.errors import InvalidValueError
+from rcilab.core.errors import ConnectionLostError, DeadlineError, InvalidValueError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode, RobotState
@@ -335,7 +335,15 @@ def open_driver(address: str, timeout: float, expected: ExpectedArm | None) -> S
         InvalidValueError: The address is not valid.
     """
     maker = _maker_at(address, None if expected is None else expected.maker)
-    return maker.open_driver(address, timeout, expected)
+    try:
+        return maker.open_driver(address, timeout, expected)
+    except DeadlineError as error:
+        other = _other_maker_at(maker, maker.parse_address(address))
+        if other is None:
+            raise
+        raise ConnectionLostError(
+            f"{error}; if it is an arm of {other.title}, its address begins with {other.scheme}://"
+        ).coded("other_scheme", cause=error, maker=other.title, scheme=f"{other.scheme}://") from error
 
 
 def parse_address(address: str, model: RobotModel | None = None) -> RobotAddress:
@@ -387,6 +395,15 @@ def _maker_at(address: object, name: str | None) -> Maker:
     found = [maker for maker in possible if not mark or maker.scheme == scheme.lower()]
     if len(found) == 1:
         return found[0]
-    schemes = " or ".join(f"{maker.scheme}://" for maker in possible)
+    schemes = ", ".join(f"{maker.scheme}:// ({maker.title})" for maker in possible)
     problem = f"begins with {scheme}://" if mark else "has no scheme"
     raise InvalidValueError("address", described(address), f"{problem}, needs {schemes}")
+
+
+def _other_maker_at(maker: Maker, address: RobotAddress) -> Maker | None:
+    """Returns another maker whose controllers answer at the port of an address, if there is one."""
+    others = [other for other in all_makers() if other.capabilities.drives and other is not maker]
+    return next(
+        (other for other in others if other.parse_address(f"{other.scheme}://{address.host}").port == address.port),
+        None,
+    )

@@ -45,7 +45,7 @@ def test_nobody_is_looked_for_and_nothing_measured_unasked(capsys: pytest.Captur
     [
         (["--seconds", "-1"], "0 to 3600 s"),
         (["--seconds", "nan"], "0 to 3600 s"),
-        (["--robot", "tcp://192.168.0.160"], "needs fci:// or rci://"),
+        (["--robot", "tcp://192.168.0.160"], "needs fci:// (Franka), "),
     ],
 )
 def test_a_question_that_is_none_is_refused_before_anything_is_asked(

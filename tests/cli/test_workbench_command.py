@@ -14,6 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from rcilab.cli.workbench import _arm_at
+from rcilab.control_process.launch import start_controller
+
 COMMAND = [sys.executable, "-m", "rcilab.cli"]
 
 
@@ -72,7 +75,11 @@ def test_it_prints_one_line_serves_the_page_and_ends_cleanly(number):
         (["--private"], "RCILAB_TOKEN"),
         (["--token-file", "/nowhere/token"], "cannot read the token in /nowhere/token"),
         (["--robot", "http://x"], "rci://"),
-        (["--robot", "foo"], "'foo' is not a valid address; write it like rci://"),
+        (["--robot", "foo"], "'foo' has no scheme, needs fci:// (Franka), "),
+        (["--robot", "172.16.0.2"], "'172.16.0.2' has no scheme, needs fci:// (Franka), "),
+        (["--robot", "foo", "--model", "xMate3"], "'foo' is not a valid address; write it like rci://"),
+        (["--robot", "fci://127.9.9.9"], "rcilab: no robot at fci://127.9.9.9:1337"),
+        (["--robot", "rci://127.9.9.9"], "to open the page before the controller answers, add --model NAME"),
         (["--port", "70000"], "0 to 65535"),
         (["--port", "abc"], "0 to 65535"),
     ],
@@ -86,9 +93,28 @@ def test_bad_arguments_get_one_sentence(arguments, answer):
     assert "Traceback" not in done.stderr
 
 
+def test_without_a_model_the_controller_is_asked_which_arm_it_is():
+    controller = start_controller("xMate3")
+    try:
+        assert _arm_at(controller.address) == "xMate3"
+    finally:
+        controller.end()
+
+
 def test_an_unreachable_robot_gets_a_line_in_the_terminal():
     process = subprocess.Popen(
-        [*COMMAND, "--no-browser", "--port", "0", "--quality", "light", "--robot", "rci://127.0.0.2:9"],
+        [
+            *COMMAND,
+            "--no-browser",
+            "--port",
+            "0",
+            "--quality",
+            "light",
+            "--robot",
+            "rci://127.0.0.2:9",
+            "--model",
+            "xMate3",
+        ],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

@@ -82,9 +82,13 @@ def test_an_address_leads_to_the_maker_of_its_scheme_or_of_the_model(address, mo
 @pytest.mark.parametrize(
     ("address", "model", "problem"),
     [
-        ("http://robot", None, "begins with http://, needs fci:// or rci://"),
-        ("rci://robot", "Panda", "begins with rci://, needs fci://$"),
-        ("robot", None, "has no scheme, needs fci:// or rci://"),
+        (
+            "http://robot",
+            None,
+            r"begins with http://, needs fci:// \(Franka\), .*rci:// \(ROKAE\), xarm:// \(UFACTORY\)",
+        ),
+        ("rci://robot", "Panda", r"begins with rci://, needs fci:// \(Franka\)$"),
+        ("robot", None, r"has no scheme, needs fci:// \(Franka\), "),
     ],
 )
 def test_an_address_of_no_maker_or_of_another_one_names_the_schemes(address, model, problem):

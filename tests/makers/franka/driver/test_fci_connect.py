@@ -92,6 +92,15 @@ def test_no_robot_at_an_address_says_what_to_check():
         connect("fci://127.9.9.9", load_model("Panda"))
 
 
+def test_the_scheme_of_another_maker_with_the_same_port_is_suggested(controller):
+    address = controller.address.partition("?")[0].replace("fci://", "rci://")
+    with pytest.raises(
+        ConnectionLostError, match="if it is an arm of Franka, its address begins with fci://"
+    ) as caught:
+        connect(address, timeout=0.5)
+    assert caught.value.code == "other_scheme"
+
+
 @pytest.mark.parametrize("answer", [b"", b"\x00" * 5])
 def test_what_answers_there_and_is_no_controller_is_not_waited_for(monkeypatch, answer):
     with socket.create_server(("127.0.0.1", 0)) as listener:
