@@ -102,3 +102,16 @@ def test_every_branch_of_a_thousand_poses_at_an_angle_of_joint_7_reaches_them(th
     assert np.abs(model.forward_path(branches[number, row]) - T[row]).max() < 1e-9
     distance = np.abs(wrapped(branches - q)).max(axis=2)
     assert np.nanmin(distance, axis=0).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", ["Panda", "FR3", "xArm7"])
+def test_a_configuration_in_the_plane_of_symmetry_is_found_where_several_have_one_angle_of_joint_7(name) -> None:
+    model = load_model(name)
+    q = np.tile(model.home, (200, 1))
+    q[:, [0, 2, 4]] = 0.0
+    moving = [1, 3, 5]
+    lower, upper = model.limits.joint.lower[moving], model.limits.joint.upper[moving]
+    q[:, moving] = np.random.default_rng(3).uniform(lower, upper, (200, 3))
+    found = model.inverse_batch(model.forward_path(q), 0.0).q
+    distance = np.fmin.reduce(np.abs(wrapped(found - q[:, np.newaxis])).max(axis=2), axis=1)
+    assert (distance < 1e-6).mean() > 0.95  # All but those where rounding hides the root itself.

@@ -33,7 +33,7 @@ DEGREE = 8
 _NODES = 20
 """Angles of joint 7 at which it is evaluated. Tuning value: 17 determine it, some more even out the rounding."""
 _STEP = 1e-5  # [rad] Of joint 7, by which derivatives are formed.
-_NEAR, _FAR = 1e-4, 0.05  # [rad] How far from psi joint 3 may be at a root: every branch, and the nearest one.
+_FAR = 0.05  # [rad] How far from psi joint 3 may be at a root: where several coincide, rounding spreads them.
 _SMALL = 1e-8  # [rad] What a joint may still have to turn so that a straight line is exact to rounding.
 _SAME = 1e-6  # [rad] Solutions that differ by less are equal.
 _SPREAD = 64  # Number of solutions to return if there are infinitely many; tuning value.
@@ -193,7 +193,7 @@ def _joint_angles(
     """Returns the solutions near roots; each root gives one, or none if it is caused by rounding."""
     table = trace(arm, rotations, positions, q7)[0].reshape(4, len(q7), 7)
     size = np.nan_to_num(np.abs(wrapped(2.0 * (table[..., ELBOW] - psi))), nan=pi)  # The twin is half a turn away.
-    branch, root = np.nonzero((size < _NEAR) | ((size == size.min(axis=0)) & (size < _FAR)))
+    branch, root = np.nonzero(size < _FAR)
     R, p, wanted, q = rotations[root], positions[root], psi[root], table[branch, root]
     after = trace(arm, R, p, q7[root] + _STEP)[0].reshape(4, len(root), 7)[branch, np.arange(len(root))]
     along = wrapped(after - q)
