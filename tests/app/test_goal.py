@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rcilab.app.goal.goal import NEAR_LIMIT, evaluate_joints, evaluate_pose, margin
+from rcilab.app.goal.goal import NEAR_LIMIT, evaluate_joints, evaluate_pose, goal_toward, margin
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae.robots import ROBOTS
 from rcilab.model.robot_model import load_model
@@ -83,3 +83,29 @@ def test_any_target_is_answered_without_an_exception():
         assert (reach.q >= model.limits.joint.lower).all()
         assert (reach.q <= model.limits.joint.upper).all()
         q = reach.q
+
+
+def test_the_arm_angle_that_was_requested_returns_when_the_target_allows_it_again():
+    model = load_model("xMatePro7")
+    home = model.forward(model.home)
+    asked = goal_toward(model, home, model.home, psi=1.3)
+    moved = goal_toward(model, Pose(home.position + [-0.16, 0.16, 0.24], home.wxyz), asked.q, kept_psi=asked.kept_psi)
+    assert moved.reach.missed_by is None
+    assert moved.psi < 1.2
+    assert moved.snapped is not None
+    assert moved.snapped.values["wanted"] == pytest.approx(1.3)
+    assert moved.snapped.values["taken"] == moved.psi
+    back = goal_toward(model, home, moved.q, kept_psi=moved.kept_psi)
+    assert back.psi == pytest.approx(1.3)
+    assert back.snapped is None
+
+
+def test_a_target_out_of_reach_leaves_the_arm_of_a_panda_in_its_plane_of_symmetry():
+    model = load_model("Panda")
+    home = model.forward(model.home)
+    goal = goal_toward(model, home, model.home)
+    for x in (0.45, 2.0, 0.7):
+        target = Pose((x, 0.0, 0.5), home.wxyz)
+        goal = goal_toward(model, target, goal.q, kept_psi=goal.kept_psi)
+    assert goal.reach.missed_by is None
+    assert goal.psi == pytest.approx(0.0, abs=1e-9)

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from rcilab.app.goal.elbow import MIN_REPORTED_CHANGE, say_why
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import KinematicsError, UnreachableError
 from rcilab.core.spatial import Pose
@@ -20,6 +21,7 @@ Tone = Literal["good", "warn", "bad"]
 POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
 """Names of the fields of a pose."""
 NEAR_LIMIT = math.radians(5.0)  # [rad] A smaller distance to a limit is reported.
+_LEVER = 2.0  # Largest turn of a joint per turn of the elbow in one branch; tuning value.
 NEAR_SINGULAR = 0.03  # [m, rad] per rad. With a smaller singular value of the Jacobian the arm counts as singular.
 
 
@@ -50,6 +52,8 @@ class Goal:
     reach: TargetStatus
     psi: float | None = None
     """Arm angle of `q`, [rad]; None for an arm without one."""
+    kept_psi: float | None = None
+    """Arm angle that a new target keeps where it can, [rad]: the last one requested, by itself or by joint angles."""
     snapped: Message | None = None
     """Why the arm angle differs from the requested one; None if it does not."""
 
@@ -67,7 +71,8 @@ def with_pose_field(pose: Pose, name: str, value: float) -> Pose:
 
 def goal_at(model: RobotModel, q: JointVector) -> Goal:
     """Returns the goal at joint angles, shape (n,), [rad]."""
-    return Goal(q=q, target=model.forward(q), reach=evaluate_joints(model, q), psi=_arm_angle(model, q))
+    psi = _arm_angle(model, q)
+    return Goal(q=q, target=model.forward(q), reach=evaluate_joints(model, q), psi=psi, kept_psi=psi)
 
 
 def goal_toward(
@@ -76,6 +81,7 @@ def goal_toward(
     near: JointVector,
     psi: float | None = None,
     snapped: Message | None = None,
+    kept_psi: float | None = None,
 ) -> Goal:
     """Returns the goal at a target pose, or at the reachable pose nearest to it.
 
@@ -83,17 +89,44 @@ def goal_toward(
         model: The arm.
         target: Pose of the tool in base.
         near: Joint angles that choose the branch, shape (n,), [rad].
-        psi: Requested arm angle, [rad]; None keeps that of `near`.
+        psi: Requested arm angle, [rad]; None keeps `kept_psi` where the target can be reached with it.
         snapped: Why `psi` differs from the requested arm angle.
+        kept_psi: Arm angle to keep, [rad]; None is that of `near`.
     """
     reach = evaluate_pose(model, target, near, psi)
-    return Goal(q=reach.q, target=target, reach=reach, psi=_arm_angle(model, reach.q), snapped=snapped)
+    taken = _arm_angle(model, reach.q)
+    if psi is not None:
+        kept_psi = taken
+    elif kept_psi is None:
+        kept_psi = _arm_angle(model, near)
+    if psi is None and kept_psi is not None and taken is not None and reach.missed_by is None:
+        reach, snapped = _at_kept_psi(model, target, reach, taken, kept_psi)
+        taken = _arm_angle(model, reach.q)
+    return Goal(q=reach.q, target=target, reach=reach, psi=taken, kept_psi=kept_psi, snapped=snapped)
+
+
+def _at_kept_psi(
+    model: RobotModel, target: Pose, reach: TargetStatus, taken: float, kept: float
+) -> tuple[TargetStatus, Message | None]:
+    """Returns the status at the arm angle to keep, or the given one and why it has another."""
+    turn = abs(math.remainder(taken - kept, math.tau))
+    if turn < MIN_REPORTED_CHANGE:
+        return reach, None
+    why = message("elbow.why.other")
+    try:
+        solutions = model.inverse(target, kept, reach.q)
+        q = solutions.nearest(reach.q)
+        if np.abs(q - reach.q).max() <= _LEVER * turn:
+            return _evaluate_configuration(model, q, solutions), None
+    except UnreachableError as error:
+        why = message("elbow.kind.reach") if error.joint is None else say_why((error.joint,))
+    return reach, message("elbow.snapped_only", wanted=kept, why=why, taken=taken)
 
 
 def reevaluated(model: RobotModel, goal: Goal) -> Goal:
     """Returns a goal with its status within other limits; an unreachable target is solved again."""
     if goal.reach.missed_by is not None:
-        return goal_toward(model, goal.target, goal.q, goal.psi)
+        return replace(goal_toward(model, goal.target, goal.q, goal.psi), kept_psi=goal.kept_psi)
     return replace(goal, reach=evaluate_joints(model, goal.q))
 
 

@@ -431,8 +431,8 @@ class GoalActions:
         """
         self._store.clear_problems(*_FIELDS)
         state = self._store.state
-        around = state.goal.q if near is None else near
-        self._show_goal(goal_toward(state.model, target, around, psi, snapped))
+        around, kept = (state.goal.q, state.goal.kept_psi) if near is None else (near, None)
+        self._show_goal(goal_toward(state.model, target, around, psi, snapped, kept))
         self.plan()
 
     def _show_goal(self, goal: Goal) -> None:
