@@ -143,7 +143,8 @@ class Actuator:
                 axes=None if self._axes.is_world else np.array(self._axes.rotation(tool.pose)).reshape(3, 3),
                 damper=self._damper,
             )
-        return guide_torque(model, measured, self._freedom, self._T_held, self._soft_limits, self._q3_held)
+        damping = parameters.guide_damping
+        return guide_torque(model, measured, self._freedom, self._T_held, self._soft_limits, self._q3_held, damping)
 
 
 def _approach(wrench: tuple[float, ...], desired: tuple[float, ...]) -> tuple[float, ...]:

@@ -63,6 +63,8 @@ class ArmParameters:
     force_axes: ForceAxesKind = ForceAxesKind.WORLD
     virtual_guide: bool = False
     """Whether walls push the tool back into the active safety box while the arm is compliant."""
+    guide_damping: float = 1.0
+    """Factor on the damping of a guided arm."""
     auto_limit: bool = False
     """Whether commanded joint angles are stopped inside the soft limits instead of violating them."""
 

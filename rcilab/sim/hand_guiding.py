@@ -55,6 +55,7 @@ def guide_torque(
     T_held: Pose,
     limits: JointLimits | None = None,
     q3_held: float = 0.0,
+    damping: float = 1.0,
 ) -> JointVector:
     """Returns the torque on a guided arm, without gravity, shape (n,), [N m].
 
@@ -65,6 +66,7 @@ def guide_torque(
         T_held: Pose of the tool in base at the start of guiding.
         limits: Joint limits; None: those of the arm.
         q3_held: Angle of joint 3 at the start, [rad]; used if the elbow is not free.
+        damping: Factor on the damping.
     """
     terms = model.rigid_body.tool_terms(measured.q, measured.dq)
     limits = model.limits.joint if limits is None else limits
@@ -77,9 +79,11 @@ def guide_torque(
         hold = limits.torque[_ELBOW] / STOP_ZONE
         stiffness[_ELBOW, _ELBOW] += hold
         spring[_ELBOW] += hold * (q3_held - measured.q[_ELBOW])
-    spring = spring - JOINT_DAMPING * model.limits.joint.torque * measured.dq
+    spring = spring - damping * JOINT_DAMPING * model.limits.joint.torque * measured.dq
     coriolis = model.rigid_body.motion_torque(measured.q, measured.dq, np.zeros(model.n))
-    return design_damping(terms.mass_inverse, stiffness, GUIDE_DAMPING).torque(spring, -measured.dq) + coriolis
+    return (
+        design_damping(terms.mass_inverse, stiffness, damping * GUIDE_DAMPING).torque(spring, -measured.dq) + coriolis
+    )
 
 
 def wall_torque(model: RobotModel, measured: Measurement, box: SafetyBox, stiffness6: tuple[float, ...]) -> JointVector:

@@ -10,7 +10,12 @@ from rcilab.core.spatial import Pose
 from rcilab.makers.ufactory.controller.io_requests import IO_HANDLERS, IoRequests
 from rcilab.makers.ufactory.controller.motion_requests import MOTIONS, handle_motion
 from rcilab.makers.ufactory.controller.reporter import padded, user_pose
-from rcilab.makers.ufactory.controller.settings import MILLIMETRE, RESETTING, apply_setting
+from rcilab.makers.ufactory.controller.settings import (
+    MILLIMETRE,
+    RESETTING,
+    SPEED_FACTOR_PARAMETER,
+    apply_setting,
+)
 from rcilab.makers.ufactory.controller.tasks import Task, Tasks
 from rcilab.makers.ufactory.controller.xarm_controller import TaskEvent, XArmController
 from rcilab.makers.ufactory.errors import UfactoryWarning
@@ -215,6 +220,11 @@ def _set(is_valid: bool, name: str, value: object, problem: str) -> bytes:
     return b""
 
 
+def _common_parameter(controller: XArmController, number: int) -> bytes:
+    _set(number == SPEED_FACTOR_PARAMETER, "parameter", number, f"is not known; known: {SPEED_FACTOR_PARAMETER}")
+    return encode_values("f", controller.settings.servo_speed_factor)
+
+
 def _set_mode(controller: XArmController, mode: int, is_undetected: int = 0) -> bool:
     return controller.set_mode(mode, detects_motion=not is_undetected)
 
@@ -270,6 +280,7 @@ _SIMPLE: dict[Function, _Simple] = {
     Function.SERVO_READ_16: lambda c, i, v: bytes(4),
     Function.SERVO_READ_32: lambda c, i, v: bytes(4),
     Function.SERVO_STATUS: lambda c, i, v: _servo_status(c),
+    Function.GET_COMMON_PARAMETER: lambda c, i, v: _common_parameter(c, v[0]),
     Function.GET_POWER_VERSION: lambda c, i, v: bytes(6),
     Function.GET_HARDWARE_TYPES: lambda c, i, v: bytes(2),
 }

@@ -20,6 +20,7 @@ from rcilab.makers.ufactory.bounds import (
     LONGEST_TOOL,
     SENSITIVITIES,
     SENSITIVITY_STEP,
+    SERVO_SPEED_FACTOR,
     TOOL_ACCELERATION,
     TOOL_JERK,
 )
@@ -32,6 +33,8 @@ from rcilab.sim.arm_setup import ArmSetup
 
 WIDEST_BOUNDARY = (9999, -9999, 9999, -9999, 9999, -9999)  # [mm] As the client library has it before any report.
 TOOL_SPEED = 1.0  # [m/s] User manual, 10.
+_DAMPING_STEP = 1.6  # Factor on the damping of a guided arm for each step of the teach sensitivity; rcilab's own value.
+SPEED_FACTOR_PARAMETER = 1  # Number of the factor among the common parameters.
 
 RESETTING = frozenset(
     {
@@ -57,6 +60,9 @@ class Settings(ArmParameters):
     collision_sensitivity: int = DEFAULT_SENSITIVITY
     """0: no collision is detected; 5: the smallest."""
     teach_sensitivity: int = DEFAULT_SENSITIVITY
+    """0: the hand moves the arm against the largest damping; 5: the smallest."""
+    servo_speed_factor: float = SERVO_SPEED_FACTOR
+    """By which joint targets of mode 1 may exceed the tool's largest speed."""
     joint_jerk: float = DEFAULT_JOINT_JERK
     """[rad/s^3]."""
     joint_acceleration: float = JOINT_ACCELERATION
@@ -162,12 +168,21 @@ def apply_setting(settings: Settings, function: Function, values: tuple[Any, ...
             value = _within("collision sensitivity", values[0], *SENSITIVITIES)
             return _with_thresholds(replace(settings, collision_sensitivity=value))
         case Function.SET_TEACH_SENSITIVITY:
-            return replace(settings, teach_sensitivity=_within("teach sensitivity", values[0], *SENSITIVITIES))
+            level = _within("teach sensitivity", values[0], *SENSITIVITIES)
+            damping = _DAMPING_STEP ** (DEFAULT_SENSITIVITY - level)
+            return replace(settings, teach_sensitivity=level, guide_damping=damping)
         case Function.SET_GRAVITY_DIRECTION:
             length = hypot(*values)
             if not 0.0 < length < inf:
                 raise InvalidValueError("gravity direction", list(values), "has no direction")
             return replace(settings, gravity=tuple(value / length for value in values))
+        case Function.SET_COMMON_PARAMETER:
+            number, factor = values
+            if number != SPEED_FACTOR_PARAMETER:
+                raise InvalidValueError("parameter", number, f"is not known; known: {SPEED_FACTOR_PARAMETER}")
+            if not 0.0 < factor < inf:
+                raise InvalidValueError("linear speed limit factor", factor, "must be above 0 and finite")
+            return replace(settings, servo_speed_factor=factor)
         case Function.SET_JOINT_JERK:
             return replace(settings, joint_jerk=_positive("joint jerk", values[0], JOINT_JERK, "rad/s^3"))
         case Function.SET_JOINT_ACCELERATION:

@@ -23,7 +23,7 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
 from rcilab.i18n.translator import Remark
-from rcilab.makers.ufactory.bounds import JOINT_VELOCITY, SERVO_PERIOD
+from rcilab.makers.ufactory.bounds import JOINT_VELOCITY, SERVO_PERIOD, SERVO_SPEED_FACTOR
 from rcilab.makers.ufactory.controller.gripper import Gripper
 from rcilab.makers.ufactory.controller.modes import (
     SET_PAUSED,
@@ -66,6 +66,7 @@ _OF_THE_ARM = (
     "T_flange_tool",
     "load",
     "collision_thresholds",
+    "guide_damping",
     "reduced",
     "reduced_joint_speed",
     "reduced_lower",
@@ -531,7 +532,7 @@ class XArmController:
             return
         if self.mode is Mode.SERVO:
             speed = hypot(*self.arm.tool_c.twist[:3])
-            bound = self.model.limits.joint_tool_velocity
+            bound = self.model.limits.joint_tool_velocity * self.settings.servo_speed_factor / SERVO_SPEED_FACTOR
             if speed > bound * _SPEED_MARGIN:
                 text = f"the tool would move with {speed:.3g} m/s, faster than {bound:g} m/s"
                 remark = Remark(text, "servo_speed", value=speed, bound=bound, unit="m/s")

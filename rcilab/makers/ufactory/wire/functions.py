@@ -114,6 +114,8 @@ class Function(IntEnum):
     TOOL_OUTPUT_AT_POSITION = 145
     SET_IO_RESET = 146
     ANALOG_AT_POSITION = 147
+    SET_COMMON_PARAMETER = 232
+    GET_COMMON_PARAMETER = 233
     CHECK_FEEDBACK = 253
     SET_FEEDBACK = 254
 
@@ -188,6 +190,8 @@ _LAYOUTS: dict[Function, tuple[str, ...]] = {
     Function.TOOL_OUTPUT_AT_POSITION: ("<2B4f",),
     Function.SET_IO_RESET: ("2B",),
     Function.ANALOG_AT_POSITION: (">BH|<4f",),
+    Function.SET_COMMON_PARAMETER: ("<Bf",),
+    Function.GET_COMMON_PARAMETER: ("B",),
     Function.SET_FEEDBACK: ("B",),
 }
 

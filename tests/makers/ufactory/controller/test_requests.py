@@ -13,6 +13,7 @@ from rcilab.makers.ufactory.controller.modes import Mode
 from rcilab.makers.ufactory.wire.functions import Function
 from rcilab.makers.ufactory.wire.poses import pose_as_mm_rpy, pose_from_mm_rotation, pose_from_mm_rpy
 from rcilab.makers.ufactory.wire.reports import HIGH_RATE, NORMAL, REAL, REPORTS, RICH
+from rcilab.sim.arm_setup import ArmSetup
 from tests.makers.ufactory.controller.conftest import Q6, Arm
 
 SPEEDS = (200.0, 2000.0, 0.0)
@@ -180,6 +181,32 @@ def test_reduced_mode_limits_speeds_and_is_reported(arm: Arm) -> None:
     assert len(payload) == 79
     assert payload[0] == 1
     np.testing.assert_allclose(floats(payload[13:21]), (50.0, 0.2), atol=1e-5)
+
+
+def test_the_factor_on_the_tool_speed_of_mode_1_is_set_read_and_acts(arm: Arm) -> None:
+    assert floats(arm.call(233, "B", 1)[1]) == pytest.approx((1.2,))
+    arm.call(232, "<Bf", 1, 0.05)
+    assert floats(arm.call(233, "B", 1)[1]) == pytest.approx((0.05,))
+    arm.ready(Mode.SERVO)
+    arm.call(Function.SERVO_JOINT, "10f", Q6[0] + 0.1, *Q6[1:], 0.0, 0.0, 0.0, 0.0)
+    arm.run(until=lambda: arm.controller.error is not None)
+    assert arm.error[0] == 60
+    arm.call(232, "<Bf", 2, 0.05)
+    assert arm.error[1] == 12
+
+
+def test_the_teach_sensitivity_changes_how_far_the_hand_moves_the_arm() -> None:
+    moved: list[float] = []
+    for level in (0, 3, 5):
+        arm = Arm(plant="mujoco")
+        arm.controller.set_up(ArmSetup(q=Q6))
+        arm.call(Function.SET_TEACH_SENSITIVITY, "B", level)
+        arm.ready(Mode.TEACH)
+        arm.step(310)
+        arm.controller.arm.plant.push((0.0, 10.0, 0.0, 0.0, 0.0, 0.0))
+        arm.step(300)
+        moved.append(abs(arm.q[0] - Q6[0]))
+    assert moved[0] < 0.8 * moved[1] < 0.8 * moved[2]
 
 
 def test_joint_states_have_positions_velocities_and_torques(arm: Arm) -> None:
