@@ -149,6 +149,23 @@ def test_torques_of_a_joint_impedance_controller_with_the_model(robot: Any) -> N
     np.testing.assert_allclose(states[-1].q, states[0].q + step, atol=0.02)
 
 
+@pytest.mark.parametrize(("rotors", "damping", "error"), [(0.1, 1.0, 6e-3), (0.0, 0.0, 0.1)])
+def test_computed_torques_need_the_rotors_and_the_damping_that_the_model_leaves_out(
+    robot: Any, rotors: float, damping: float, error: float
+) -> None:
+    control, model, duration = robot.start_torque_control(), robot.load_model(), 1.5
+    step, rate = np.array([0.3, 0.2, -0.3, 0.3, 0.3, -0.3, 0.5]), np.pi / duration
+
+    def command(start: Any, t: float, state: Any) -> Any:
+        dq, ddq = 0.5 * step * rate * np.sin(rate * t), 0.5 * step * rate**2 * np.cos(rate * t)
+        tau = np.reshape(model.mass(state), (7, 7)) @ ddq + model.coriolis(state) + rotors * ddq + damping * dq
+        return franka.Torques((min(1.0, t / 0.02) * tau).tolist())
+
+    states = loop(control, duration, command)
+    off = np.abs(np.subtract(states[-1].q, states[0].q) - step)
+    assert (off.max() < error) if rotors else (off.min() > error)
+
+
 def test_goals_that_the_arm_plans_itself(robot: Any, arm: Served) -> None:
     handling = franka.AsyncPositionControlHandler
     settings = handling.Configuration(maximum_joint_velocities=[1.0] * 7, goal_tolerance=10.0)
