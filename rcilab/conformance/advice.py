@@ -25,6 +25,11 @@ def factor_text(ratio: float) -> str:
     return f"{ratio:.0f}" if ratio < _LARGE else f"{ratio:.3g}"
 
 
+def plural(count: int, noun: str) -> str:
+    """Returns a number of things as text."""
+    return f"{count} {noun}" + "s" * (count != 1)
+
+
 def with_degrees(angle: float, text: str) -> str:
     """Returns an angle in radians, as in `text`, and in degrees."""
     angle_deg = degrees(angle)

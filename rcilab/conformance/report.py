@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from rcilab.conformance.advice import share, with_degrees
+from rcilab.conformance.advice import plural, share, with_degrees
 from rcilab.conformance.catalogue import Language, Phrase
 from rcilab.conformance.certificate import Certificate
 from rcilab.conformance.explain import MAX_LISTED, explain_report, explain_violation
@@ -366,13 +366,9 @@ class Report:
             nearest = f"{worst.condition.quantity} of {worst.location}, {share(worst.ratio)} of its bound"
             if worst.condition.is_clearance:
                 nearest = f"{worst.location}, {worst.value:.4g} m apart"
-            advice = f"; {_plural(len(self.warnings), 'recommendation')} not met" if self.warnings else ""
+            advice = f"; {plural(len(self.warnings), 'recommendation')} not met" if self.warnings else ""
             return f"conforms{advice}; nearest necessary bound: {nearest}"
         broken = [row for row in self.rows if not row.ok and row.necessity == "necessary"]
         names = ", ".join(dict.fromkeys(row.fault.manual_name for row in broken if row.fault is not None))
         outcome = f"the robot would stop with {names}" if names else "the robot would not notice before it hits"
-        return f"does not conform: {_plural(len(self.violations), 'violation')}; {outcome}"
-
-
-def _plural(count: int, noun: str) -> str:
-    return f"{count} {noun}" + ("" if count == 1 else "s")
+        return f"does not conform: {plural(len(self.violations), 'violation')}; {outcome}"

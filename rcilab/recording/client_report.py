@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from rcilab.conformance.advice import share
+from rcilab.conformance.advice import plural, share
 from rcilab.conformance.report import ConditionResult, Report
 from rcilab.core.errors import RcilabError
 from rcilab.core.state import require_mode
@@ -51,7 +51,7 @@ def report_on_client(run: Run, end: MotionEnd | None = None, name: str = "motion
     answered = int((run.cycles["sent_ns"] != 0).sum())
     received = answered if end is None else end.received
     late = int(run.cycles["late"].max(initial=0)) if end is None else end.late
-    counts = f"{_plural(received, 'command')}, {late} late; {_plural(missed, 'cycle')} without one"
+    counts = f"{plural(received, 'command')}, {late} late; {plural(missed, 'cycle')} without one"
     line = f"{name}, {run.setup.motion_kind}, {run.duration:.3f} s, {stopped}{nearest}; {counts}"
     lines = [line, "", *(f"Stopped: {part}" for part in _parts(reason)), ""]
     if report is not None:
@@ -123,10 +123,6 @@ def _format(value: object) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(map(_format, cast("list[object]", value))) + "]"
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def _plural(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _describe_tool(model: RobotModel) -> dict[str, object]:

@@ -66,7 +66,8 @@ class JitterBuffer:
     """The queue between network and cycle. Owned by the controller's loop.
 
     Attributes:
-        cycles: Cycles of this motion since its first command was played, the lost ones among them.
+        cycles: Cycles of this motion since its first command was played, the lost ones among them. Those of a motion to
+            goals go on until the arm has stopped.
         span: Cycles between its first and its last played command.
         lost: Lost cycles of this motion.
         consecutive_lost: Lost cycles since the last command.
@@ -130,6 +131,11 @@ class JitterBuffer:
 
     def __len__(self) -> int:
         return len(self._queue)
+
+    @property
+    def is_streamed(self) -> bool:
+        """Whether every cycle of the motion needs a command."""
+        return self._is_streamed
 
     @property
     def is_starved(self) -> bool:
@@ -207,6 +213,7 @@ class JitterBuffer:
                 neither is clear.
         """
         if self.is_finished or not (self._is_streamed or self._queue):
+            self.cycles += self.is_playing and not self._is_streamed
             return _WAITING
         if not self.is_playing:
             if not self._queue:

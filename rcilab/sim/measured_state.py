@@ -9,6 +9,7 @@ from rcilab.conformance.common_conditions import compliant_limits, unlimited_acc
 from rcilab.conformance.measured_monitor import MeasuredMonitor, find_collision_joint
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox
+from rcilab.i18n.rounding import format_pair
 from rcilab.i18n.translator import Remark
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.momentum_observer import MomentumObserver
@@ -111,5 +112,6 @@ class MeasuredStateMonitor:
             return None
         joint = find_collision_joint(torques, thresholds)
         torque, threshold = torques[joint], thresholds[joint]
-        sentence = f"joint {joint + 1}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
+        size, bound = format_pair(abs(torque), threshold)
+        sentence = f"joint {joint + 1}: external torque {size} N m is above its threshold {bound} N m"
         return Remark(sentence, "collision", joint=joint + 1, value=torque, bound=threshold, unit="N m")

@@ -28,6 +28,7 @@ from rcilab.makers.franka.controller.modes import MotionKind, motion_of
 from rcilab.makers.franka.controller.phases import (
     IN_MOTION,
     MOVE_REFUSALS,
+    REASONS,
     RECOVERY_REFUSALS,
     SETTABLE,
     STOP_STATUSES,
@@ -52,6 +53,7 @@ from rcilab.sim.generators import CommandKind
 from rcilab.sim.generators.start import StartTolerance
 from rcilab.sim.hand_guiding import GuidedFreedom
 from rcilab.sim.jitter_buffer import JitterBuffer
+from rcilab.sim.phase_log import Activity, Situation
 from rcilab.sim.self_collision import SelfCollisionWatch
 from rcilab.sim.violations import Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
@@ -61,6 +63,8 @@ STATES_BEFORE_START = 2  # That a client reads after Move: one that shows the mo
 RECOVERY_TIME = 50  # [cycles] Shortest duration of an error recovery, so that it is visible to a client.
 _NO_GENERATOR, _NO_CONTROLLER = 0, 3  # As in the state.
 _RESTING_LAWS = {Phase.USER_STOPPED: ControlLaw.BRAKED, Phase.GUIDING: ControlLaw.GUIDE}
+_ACTIVITIES = {Phase.USER_STOPPED: Activity.SAFETY_STOPPED, Phase.GUIDING: Activity.GUIDING}
+"""Without a motion; READY in all other phases."""
 _MOVES_THE_TOOL = (SetNEToEE, SetLoad)
 """Settings of tool and load, with which the arm begins again at its present angles."""
 _ROW_MAJOR = itemgetter(*(column * 4 + row for row in range(4) for column in range(4)))
@@ -82,7 +86,7 @@ class FciController:
         outcome: How the last motion ended, for the second answer to its Move; None while there is no answer due.
         state: The last reported state.
         ignored: Number of commands that arrived outside of a motion.
-        on_phase: Called with the phases before and after every transition.
+        on_transition: Receives the situation before and after every transition.
 
     Args:
         arm: The arm after power-up.
@@ -103,11 +107,12 @@ class FciController:
         self.outcome: Status | None = None
         self.ignored = 0
         self.button: SafetyButton = "none"
-        self.on_phase: Callable[[Phase, Phase], None] = lambda before, after: None
+        self.on_transition: Callable[[Situation, Situation], None] = lambda before, after: None
         conditions = arm.model.description.conditions
         assert conditions is not None  # Every Franka arm has them.
         self._table = conditions()
         self._motion: MotionKind | None = None
+        self._situation = self._find_situation()
         self._deviations = PoseDeviations()
         self._links = SelfCollisionWatch(arm.model)
         self._final: Status | None = None  # Outcome of a motion whose commands have ended, once the arm has stopped.
@@ -342,9 +347,9 @@ class FciController:
     def set(self, request: Request) -> tuple[Status, str]:
         """Applies a setter; returns the status of the answer, and why it is refused."""
         if self.phase not in SETTABLE:
-            return Status.NOT_POSSIBLE, f"not possible in phase {self.phase_name}"
+            return Status.NOT_POSSIBLE, REASONS[self.phase]
         if isinstance(request, _MOVES_THE_TOOL) and not self.arm.has_stopped:
-            return Status.NOT_POSSIBLE, "not possible while the arm moves"
+            return Status.NOT_POSSIBLE, "the arm moves"
         try:
             settings = apply_request(self.settings, request, self.model.description)
         except InvalidValueError as error:
@@ -453,12 +458,20 @@ class FciController:
             self.arm.discard_motion()
 
     def _enter(self, phase: Phase) -> None:
-        before, self.phase = self.phase, phase
+        self.phase = phase
         if phase not in IN_MOTION:
             self._motion = None
         self.arm.is_monitored = self._motion is not None
         self.arm.resting_law = _RESTING_LAWS.get(phase, ControlLaw.POSITION)
-        self.on_phase(before, phase)
+        before, self._situation = self._situation, self._find_situation()
+        self.on_transition(before, self._situation)
+
+    def _find_situation(self) -> Situation:
+        motion, activity = self._motion, _ACTIVITIES.get(self.phase, Activity.READY)
+        if motion is None:
+            return Situation(activity, self.phase_name, self.faults, "", "")
+        mode = motion.reported_controller.name.lower()
+        return Situation(Activity.MOVING, self.phase_name, self.faults, mode, motion.description)
 
     @property
     def _shown(self) -> tuple[int, int]:

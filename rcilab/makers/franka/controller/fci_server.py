@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import DecodeError, ModelError, UsageError
 from rcilab.makers.franka.bounds import CLIENT_PORT
 from rcilab.makers.franka.controller.fci_controller import FciController
 from rcilab.makers.franka.controller.hand_server import HAND_PORT, HandServer
 from rcilab.makers.franka.controller.model_library import build_model_library, runs_here
-from rcilab.makers.franka.controller.phases import Phase
+from rcilab.makers.franka.controller.phases import REASONS, Phase
 from rcilab.makers.franka.controller.robot_model import build_robot_model
 from rcilab.makers.franka.wire.command_packet import decode_command
 from rcilab.makers.franka.wire.frame import (
@@ -41,9 +40,12 @@ from rcilab.makers.franka.wire.versions import VERSION_5, VERSION_10, FciVersion
 from rcilab.robots import RobotDescription
 from rcilab.sim.channels import ClientLink, Peer, TcpChannel, UdpChannel
 from rcilab.sim.controller_config import ControllerConfig
+from rcilab.sim.phase_log import PhaseLog
 from rcilab.sim.virtual_arm import VirtualArm
 
 _PROTOCOL = "FCI"
+_PRESSED = "the user stop was pressed: the arm stops"
+_DUE_TO_PHASE = (Status.NOT_POSSIBLE, Status.EMERGENCY_ABORTED, Status.ABORTED)
 _RECOVERY_ENDS = {Phase.IDLE: Status.SUCCESS, Phase.USER_STOPPED: Status.EMERGENCY_ABORTED}
 _VERSIONS = {"Panda": VERSION_5, "FR3": VERSION_10}
 """The version of each arm's controller."""
@@ -113,7 +115,6 @@ class FciServer:
         self._version: FciVersion | None = None
         self._move: tuple[type[Request], int] | None = None  # Waits for the end of its motion.
         self._recovery: int | None = None  # Id of the request.
-        controller.on_phase = self._log_phase
 
     @property
     def is_quiet(self) -> bool:
@@ -124,6 +125,8 @@ class FciServer:
         """Sets the link to clients."""
         self._link = link
         self._hand.attach(link)
+        log = PhaseLog(self.controller.playout, link.log, pressed=_PRESSED, released="the user stop was released")
+        self.controller.on_transition = log.record
 
     def connect(self, peer: Peer) -> None:
         """Accepts a client; states flow after its Connect."""
@@ -188,7 +191,7 @@ class FciServer:
         if self._move is not None and outcome is not None:
             kind, command_id = self._move
             self._move = self.controller.outcome = None
-            self._answer(kind, command_id, outcome)
+            self._send_answer(kind, command_id, outcome)  # Not a refusal: the end of the motion is in the log.
         if self._recovery is not None and self.controller.phase is not Phase.RECOVERING:
             command_id, self._recovery = self._recovery, None
             status = _RECOVERY_ENDS.get(self.controller.phase, Status.ABORTED)
@@ -204,7 +207,8 @@ class FciServer:
         if request.version != version.number:
             self._link.send_frame(peer, encode_connect_response(command_id, Status.INCOMPATIBLE, version.number))
             text = f"refused a client of version {request.version}: this arm has version {version.number} of the FCI"
-            self._link.log("refused", text, request="Connect")
+            phase = self.controller.phase_name
+            self._link.log("refused", text, request="Connect", status=Status.INCOMPATIBLE.name, phase=phase)
             return
         if not self._link.direct_datagrams(peer, request.udp_port):
             self._link.drop(peer, f"asked for states at port {request.udp_port}, which is not valid")
@@ -249,22 +253,16 @@ class FciServer:
     def _answer(
         self, kind: type[Request], command_id: int, status: Status, why: str = "", *, content: bytes = b""
     ) -> None:
+        self._send_answer(kind, command_id, status, content)
+        if status in (Status.SUCCESS, Status.MOTION_STARTED):
+            return
+        phase, name = self.controller.phase, "Move" if issubclass(kind, Move) else kind.__name__
+        why = why or (REASONS.get(phase, "") if status in _DUE_TO_PHASE else "")
+        text = f"{name} was answered: {status.value}" + (f"; {why}" if why else "")
+        self._link.log("refused", text, request=name, status=status.name, phase=self.controller.phase_name)
+
+    def _send_answer(self, kind: type[Request], command_id: int, status: Status, content: bytes = b"") -> None:
         assert self._peer is not None
         assert self._version is not None
         content = content if status is Status.SUCCESS else b""
         self._link.send_frame(self._peer, encode_response(self._version, kind, command_id, status, content))
-        is_refusal = status not in (Status.SUCCESS, Status.MOTION_STARTED, Status.PREEMPTED)
-        if is_refusal:
-            name = "Move" if issubclass(kind, Move) else kind.__name__
-            text = f"{name} was answered: {status.value}" + (f"; {why}" if why else "")
-            self._link.log("refused", text, request=name, status=status.name)
-
-    def _log_phase(self, before: Phase, after: Phase) -> None:
-        playout, motion = self.controller.playout, self.controller.motion
-        if after is Phase.MOVING and motion is not None:
-            text = f"motion started: {motion.generator.name} under {motion.controller.name}".lower().replace("_", " ")
-            self._link.log("motion_started", text, generator=motion.generator.name, controller=motion.controller.name)
-        elif before is Phase.MOVING:
-            figures = f"{playout.cycles} cycles, {playout.lost} commands lost, {playout.late} late"
-            text = f"motion ended after {CYCLE_TIME * playout.span:.3f} s: {figures}"
-            self._link.log("motion_ended", text, cycles=playout.cycles, lost=playout.lost, late=playout.late)

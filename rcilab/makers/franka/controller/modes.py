@@ -46,6 +46,14 @@ class MotionKind(NamedTuple):
     """Whether the joints have the stiffness after power-up: rcilab's states then name what is commanded."""
 
     @property
+    def description(self) -> str:
+        """What is commanded, and what follows it, such as "joint position under joint impedance"."""
+        commands, law = (name.lower().replace("_", " ") for name in (self.generator.name, self.controller.name))
+        if self.controller is MoveController.EXTERNAL:
+            return "torque" if self.generator is MoveGenerator.NONE else f"torque along with {commands}"
+        return f"{commands} under {law}" if self.mode.is_streamed else f"joint goals under {law}"
+
+    @property
     def reported_generator(self) -> MotionGeneratorMode:
         """The generator in rcilab's states."""
         return _GENERATORS[self.generator]

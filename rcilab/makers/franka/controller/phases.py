@@ -73,3 +73,13 @@ RECOVERY_REFUSALS: Final = {
 
 SETTABLE: Final = (Phase.IDLE, Phase.GUIDING, Phase.REFLEX, Phase.USER_STOPPED)
 """Phases in which a setter takes effect; in the others it is not possible."""
+
+REASONS: Final = {
+    Phase.MOVING: "a motion is in progress",
+    Phase.STOPPING: "the arm still stops",
+    Phase.GUIDING: "the arm is guided by hand",
+    Phase.REFLEX: "an error stopped the arm: recover first",
+    Phase.USER_STOPPED: "the user stop is pressed: release it",
+    Phase.RECOVERING: "an error recovery is in progress",
+}
+"""Why a request is refused in a phase."""

@@ -30,6 +30,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.reported_pose import ReportedPose
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
+from rcilab.i18n.rounding import format_pair
 from rcilab.i18n.translator import Remark
 from rcilab.makers.franka.controller.settings import Settings
 from rcilab.makers.franka.errors import FrankaError
@@ -197,13 +198,15 @@ class StateReporter:
         forces = t.collision_force_accelerating if is_accelerating else t.collision_force
         for joint, (value, bound) in enumerate(zip(self._signals.tau_ext.tolist(), torques, strict=True), 1):
             if abs(value) > bound:
-                sentence = f"joint {joint}: external torque {value:.3g} N m is above its threshold {bound:g} N m"
-                yield Remark(sentence, "collision", joint=joint, value=value, bound=bound, unit="N m")
-        for axis, value, bound in zip(_AXES, self._wrench_in_K.tolist(), forces, strict=True):
+                excess = _describe_excess(value, bound, "N m", f"tau_ext_hat_filtered[{joint - 1}]")
+                sentence = f"joint {joint}: external torque {excess}"
+                yield Remark(sentence, "collision", joint=joint, value=abs(value), bound=bound, unit="N m")
+        for number, (value, bound) in enumerate(zip(self._wrench_in_K.tolist(), forces, strict=True)):
             if abs(value) > bound:
-                unit = "N m" if axis.startswith("about") else "N"
-                sentence = f"external force {axis} of K: {value:.3g} {unit} is above its threshold {bound:g} {unit}"
-                yield Remark(sentence, "external_force", axis=axis[-1], value=value, bound=bound, unit=unit)
+                axis, unit = _AXES[number], "N" if number < 3 else "N m"
+                excess = _describe_excess(value, bound, unit, f"K_F_ext_hat_K[{number}]")
+                sentence = f"external {'force' if number < 3 else 'moment'} {axis} of K: {excess}"
+                yield Remark(sentence, "external_force", axis=axis[-1], value=abs(value), bound=bound, unit=unit)
 
     def reset_collisions(self) -> None:
         """Clears the flags of collisions, as an error recovery does."""
@@ -254,6 +257,13 @@ class StateReporter:
 
     def _side(self, q4: float) -> float:
         return 1.0 if q4 > self._flip else -1.0
+
+
+def _describe_excess(value: float, bound: float, unit: str, field: str) -> str:
+    """Returns by how much an external torque or force exceeds its threshold, and with which sign clients read it."""
+    size, threshold = format_pair(abs(value), bound)
+    sign = "-" if value > 0.0 else ""
+    return f"{size} {unit} is above its threshold {threshold} {unit} ({field} is {sign}{size})"
 
 
 def columns_of(pose: Pose) -> tuple[float, ...]:

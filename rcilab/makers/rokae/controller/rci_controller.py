@@ -24,7 +24,6 @@ from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.fault_stop import faults_of, is_beyond_range
 from rcilab.makers.rokae.controller.model_download import model_response
 from rcilab.makers.rokae.controller.modes import MODES
-from rcilab.makers.rokae.controller.phase_log import Situation
 from rcilab.makers.rokae.controller.reporter import StateReporter
 from rcilab.makers.rokae.controller.request_handlers import (
     Reply,
@@ -45,6 +44,7 @@ from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.arm_setup import ArmSetup, require_stand
 from rcilab.sim.controller_config import MODE_DELAY, ForceSign
 from rcilab.sim.jitter_buffer import JitterBuffer
+from rcilab.sim.phase_log import Activity, Situation
 from rcilab.sim.plant import Plant
 from rcilab.sim.violations import ArmCondition, Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
@@ -62,6 +62,14 @@ _BUTTONS: dict[rci.SafetyStop, SafetyButton] = {
 _POWER_OFF = Remark("the client switched motor power off during a motion", "power_off")
 _WAITING = (Phase.STARTING, Phase.RECOVERING)
 _MOVING = (Phase.MOVING, Phase.STOPPING)
+_ACTIVITIES = {
+    Phase.OFF: Activity.OFF,
+    Phase.CUT_OFF: Activity.OFF,
+    Phase.USER_STOPPED: Activity.SAFETY_STOPPED,
+    Phase.GUIDING: Activity.GUIDING,
+    **dict.fromkeys(_MOVING, Activity.MOVING),
+}
+"""READY in all other phases."""
 _STILL = (Phase.OFF, Phase.IDLE, Phase.REFLEX, Phase.CUT_OFF, Phase.USER_STOPPED)
 _BRAKED = (Phase.OFF, Phase.REFLEX, Phase.CUT_OFF, Phase.USER_STOPPED, Phase.RECOVERING)
 _RESTING_LAWS = {**dict.fromkeys(_BRAKED, ControlLaw.BRAKED), Phase.GUIDING: ControlLaw.GUIDE}
@@ -428,7 +436,8 @@ class RciController:
 
     @property
     def _situation(self) -> Situation:
-        return Situation(self.phase, self.faults, self._shown[0])
+        mode, activity = self._shown[0].name.lower(), _ACTIVITIES.get(self.phase, Activity.READY)
+        return Situation(activity, self.phase_name, self.faults, mode, mode.replace("_", " "))
 
     def _act(self, action: Action, request: rci.Request | None, faults: tuple[Fault, ...]) -> None:
         match action:

@@ -10,7 +10,6 @@ from collections import deque
 from rcilab.core.errors import DecodeError
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.bounds import DEFAULT_PORT
-from rcilab.makers.rokae.controller.phase_log import PhaseLog
 from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.makers.rokae.controller.request_handlers import Reply
 from rcilab.makers.rokae.controller.state_machine import Event, Phase, When
@@ -26,11 +25,14 @@ from rcilab.makers.rokae.wire import (
 )
 from rcilab.sim.channels import ClientLink, Peer, TcpChannel, UdpChannel
 from rcilab.sim.controller_config import ControllerConfig
+from rcilab.sim.phase_log import PhaseLog
 from rcilab.sim.virtual_arm import VirtualArm
 
 SHUTDOWN_NOTICE = 20  # [cycles] For which states are still sent after the end of a motion, with the error bit.
 _PROTOCOL = "RCI"
 _OTHER_VERSION = "the client may have another version"
+_PRESSED = "a safety stop was pressed: the motors are off"
+_RELEASED = "the safety stop was released; the motors stay off"
 _QUIET = (Phase.OFF, Phase.IDLE)
 _ACTIVE = (Phase.MOVING, Phase.GUIDING)
 """Not STOPPING: its motion was ended by StopMove, after which the vendor's client may close the connection at once."""
@@ -86,7 +88,8 @@ class RciServer:
     def attach(self, link: ClientLink) -> None:
         """Sets the link to clients."""
         self._link = link
-        self.controller.on_transition = PhaseLog(self.controller.playout, link.log).record
+        log = PhaseLog(self.controller.playout, link.log, pressed=_PRESSED, released=_RELEASED)
+        self.controller.on_transition = log.record
 
     def connect(self, peer: Peer) -> None:
         """Accepts a client and sends a state first: the vendor's client waits for it for a few milliseconds."""

@@ -62,9 +62,14 @@ def test_what_a_force_does_to_the_arm_ends_its_motion(toucher: Robot, felt: FciA
     [
         (
             (HIGH, 10.0),
-            r"cartesian_reflex: external force along z of K: \S+ N is above its threshold 10 N; .*",
+            r"cartesian_reflex: external force along z of K: (\S+) N is above its threshold 10 N "
+            r"\(K_F_ext_hat_K\[2\] is -\1\); .*",
         ),
-        ((3.0, HIGH), r"joint_reflex: joint \d: external torque \S+ N m is above its threshold 3 N m.*"),
+        (
+            (3.0, HIGH),
+            r"joint_reflex: joint \d: external torque [\d.]+ N m is above its threshold 3 N m "
+            r"\(tau_ext_hat_filtered\[\d\] is -?[\d.]+\).*",
+        ),
     ],
 )
 def test_a_reflex_is_one_line_with_the_force_and_its_threshold(bounds: tuple[float, float], expected: str) -> None:

@@ -103,7 +103,7 @@ def test_a_collision_is_named_by_the_joint_that_is_farthest_beyond_its_threshold
     watch = Hand(model).cycle.arm.measured_state
     watch.tau_ext = readonly_copy(np.array([0.0, 90.0, 0.0, 0.0, 0.0, -79.4, 0.0]))
     collision = watch.find_collision((75.0, 75.0, 45.0, 45.0, 30.0, 30.0, 20.0))
-    assert collision == "joint 6: external torque -79.4 N m is above its threshold 30 N m"
+    assert collision == "joint 6: external torque 79.4 N m is above its threshold 30 N m"
     assert watch.find_collision((0.0, *[100.0] * 6)) is None
 
 
