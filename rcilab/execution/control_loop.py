@@ -242,9 +242,14 @@ class ControlLoop:
                 "within the limits, farther on; make the commands stationary before finished=True",
             )
         state = self._hold(last)
-        if self._is_unexecuted or distance_to(state, last, has_psi=self._has_psi) > ARRIVAL_TOLERANCE:
+        if self._is_unexecuted or distance_to(state, last, has_psi=self._has_psi) > self._tolerance:
             raise self._not_arrived_error(state, last)
         return None
+
+    @property
+    def _tolerance(self) -> float:
+        """Largest distance from the last command at which the arm has arrived, [rad] or [m]."""
+        return max(ARRIVAL_TOLERANCE, self._driver.resolution)
 
     @property
     def _is_unexecuted(self) -> bool:
@@ -320,7 +325,7 @@ class ControlLoop:
                 return state
             if cycle % SETTLE_CYCLES == 0:
                 if (
-                    off <= ARRIVAL_TOLERANCE
+                    off <= self._tolerance
                     or off > _APPROACH * before
                     or self._stop_check(self._time(state)) is not None
                 ):

@@ -10,7 +10,9 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from rcilab.core.arrays import readonly_copy
 from rcilab.core.errors import InvalidValueError
+from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.model.dynamics.payload import Payload
@@ -53,6 +55,9 @@ class SoftJointLimits:
 class ControllerParameters(Mapping[str, tuple[float, ...]]):
     """Parameters of the modes by name of the group; for missing groups, the controller keeps its own.
 
+    The groups `joint_velocity`, `joint_acceleration` and `tool_limits` are bounds of every motion: a model has them,
+    see `RobotConfiguration.applied_to`.
+
     Args:
         groups: Such as `joint_stiffness=(...)`. The groups of an arm: `Maker.parameters`.
     """
@@ -71,6 +76,38 @@ class ControllerParameters(Mapping[str, tuple[float, ...]]):
 
     def __repr__(self) -> str:
         return f"ControllerParameters({', '.join(f'{name}={values!r}' for name, values in self.items())})"
+
+    def limited(self, limits: Limits) -> Limits:
+        """Returns limits with the bounds among these parameters; a jerk keeps its ratio to the acceleration."""
+        joint, tool = limits.joint, limits.cartesian
+        if "joint_velocity" in self:
+            joint = replace(joint, velocity=readonly_copy(self["joint_velocity"]))
+        if "joint_acceleration" in self:
+            rise = joint.jerk / joint.acceleration
+            acceleration = readonly_copy(self["joint_acceleration"])
+            joint = replace(joint, acceleration=acceleration, jerk=readonly_copy(rise * acceleration))
+        if "tool_limits" in self:
+            v, a, w, alpha = self["tool_limits"]
+            tool = replace(
+                tool,
+                translation_velocity=v,
+                translation_acceleration=a,
+                translation_jerk=tool.translation_jerk / tool.translation_acceleration * a,
+                rotation_velocity=w,
+                rotation_acceleration=alpha,
+                rotation_jerk=tool.rotation_jerk / tool.rotation_acceleration * alpha,
+            )
+        return (
+            limits
+            if joint is limits.joint and tool is limits.cartesian
+            else replace(limits, joint=joint, cartesian=tool)
+        )
+
+
+def tool_limits_of(limits: Limits) -> tuple[float, ...]:
+    """Returns the values of the group `tool_limits`: velocity, acceleration, and those of rotations."""
+    tool = limits.cartesian
+    return tool.translation_velocity, tool.translation_acceleration, tool.rotation_velocity, tool.rotation_acceleration
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -104,13 +141,14 @@ class RobotConfiguration:
         return replace(self, **{part: getattr(newer, part) for part in newer.parts})
 
     def applied_to(self, model: RobotModel) -> RobotModel:
-        """Returns the arm with this tool, this load and these soft limits.
+        """Returns the arm with this tool, this load, these soft limits, and the bounds among these parameters.
 
         Raises:
             InvalidValueError: The load is heavier than the arm's payload.
         """
         changed = model if self.tool is None else model.with_tool(self.tool)
         changed = changed if self.load is None else changed.with_load(self.load)
+        changed = changed if self.control is None else changed.with_limits(self.control.limited(changed.limits))
         return changed if self.joints is None else changed.with_joint_limits(self.joints.lower, self.joints.upper)
 
 

@@ -48,5 +48,24 @@ def find_route(address: RobotAddress) -> HostRoute:
             ).coded("no_network", host=host) from error
 
 
+def no_robot_error(
+    address: RobotAddress, error: OSError, spent: float, timeout: float, advice: str
+) -> ConnectionLostError:
+    """Returns the error of an address at which no controller accepts a connection.
+
+    Args:
+        address: The address.
+        error: Why there is no connection.
+        spent: Time until then, [s].
+        timeout: Timeout of the connection, [s].
+        advice: What to check, and how a virtual controller is started.
+    """
+    is_late = isinstance(error, TimeoutError)
+    reason = (
+        f"did not answer within {timeout:g} s" if is_late else f"{_reason(error)} after {spent:.1f} s of {timeout:g} s"
+    )
+    return ConnectionLostError(f"no robot at {address} ({reason}); {advice}").coded("no_robot", address=str(address))
+
+
 def _reason(error: OSError) -> str:
     return error.strerror or str(error)

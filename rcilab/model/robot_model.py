@@ -184,7 +184,12 @@ class RobotModel(ReachingArm):
         limits = self.limits
         sources = {**limits.sources, "joint.lower": _SET_LIMIT, "joint.upper": _SET_LIMIT}
         joint = replace(limits.joint, lower=low, upper=high, own=limits.joint.own or limits.joint)
-        limits = replace(limits, joint=joint, sources=MappingProxyType(sources))
+        return self.with_limits(replace(limits, joint=joint, sources=MappingProxyType(sources)))
+
+    def with_limits(self, limits: Limits) -> RobotModel:
+        """Returns this arm with other limits, such as those that are set in its controller."""
+        if limits is self.limits:
+            return self
         description = replace(self.description, limits=limits)
         return RobotModel(description, self.T_flange_tool, self.load, self.T_tool_stiffness, self.mounted)
 

@@ -25,3 +25,14 @@ LARGEST_STREAM_STEP: Final = 10.0
 """Largest distance of a joint from one streamed command to the next, [deg]; the maker's page on movej_canfd."""
 LONGEST_TOOL: Final = 1.0  # [m] Distance of a tool frame, or of a centre of mass, from the flange; rcilab's own bound.
 HEAVIEST_LOAD: Final = 10.0  # [kg] rcilab's own bound; the rated payload is 5 kg.
+FIRST_WORK_FRAME: Final = "World"
+"""Work frame of a new controller."""
+FIRST_TOOL_FRAME: Final = "Arm_Tip"
+"""Tool frame of a new controller."""
+MOST_SENSITIVE: Final = 8
+"""Collision stage; 0 is off."""
+FASTEST_TOOL: Final = 10.0  # [m/s], [rad/s] Largest values of set_arm_max_line_speed and _angular_speed; rcilab's own.
+STRONGEST_TOOL: Final = 100.0  # [m/s^2], [rad/s^2] The same for accelerations.
+OUTPUTS: Final = ("DO1", "DO2", "DO3", "DO4")
+INPUTS: Final = ("DI1", "DI2", "DI3", "DI4")
+"""Digital signals of the controller."""

@@ -6,11 +6,23 @@ The numbers are those of the maker's page "Appendix: error codes". A joint has o
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from rcilab.core.fault import FaultCode
 
 
 class RealManError(FaultCode):
-    """One error; the value is its number."""
+    """One error; the value is its place among them, for records, which keep faults as bits."""
+
+    code: int
+    """Its number, as the maker prints it."""
+
+    def __new__(cls, code: int) -> RealManError:
+        """Creates the member of a number."""
+        member = int.__new__(cls, len(cls.__members__))
+        member._value_ = len(cls.__members__)
+        member.code = code
+        return member
 
     JOINT_COMMUNICATION = 0x1001
     TARGET_OVER_LIMIT = 0x1002
@@ -69,7 +81,7 @@ class RealManError(FaultCode):
     @property
     def manual_name(self) -> str:
         """The number as the maker prints it, and a name, such as `0x1002 target over limit`."""
-        return f"0x{self.value:04X} {self.name.lower().replace('_', ' ')}"
+        return f"0x{self.code:04X} {self.name.lower().replace('_', ' ')}"
 
     @property
     def cause(self) -> str:
@@ -193,3 +205,18 @@ _REMEDIES = {
     RealManError.CONTROLLER_UNDERVOLTAGE: "check the power supply",
     RealManError.CONTROLLER_KERNEL: "restart the controller",
 }
+
+_SYSTEM = {error.code: error for error in RealManError if error not in JOINT_BITS}
+
+
+def errors_of_codes(system: Iterable[int], joints: Iterable[int]) -> tuple[RealManError, ...]:
+    """Returns the errors that a controller reports, in the order of their members; unknown numbers are left out.
+
+    Args:
+        system: The numbers of the system's errors; 0 is none.
+        joints: The error word of each joint.
+    """
+    found = {_SYSTEM[code] for code in system if code in _SYSTEM}
+    words = tuple(joints)
+    found |= {error for error in JOINT_BITS if any(word & error.code == error.code for word in words)}
+    return tuple(sorted(found))

@@ -5,22 +5,26 @@ from __future__ import annotations
 from math import radians
 from typing import TYPE_CHECKING
 
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import ConditionTable
-from rcilab.core.errors import ModelError
 from rcilab.makers.maker import Capabilities, Timing
-from rcilab.makers.realman.bounds import ANGLE_STEP, LONGEST_TOOL
+from rcilab.makers.realman.bounds import ANGLE_STEP, INPUTS, LONGEST_TOOL, OUTPUTS, PUSH_PERIOD
 from rcilab.makers.realman.conditions import REALMAN_CONDITIONS
 from rcilab.makers.realman.errors import RealManError
 from rcilab.makers.realman.robots import ROBOTS
 
 if TYPE_CHECKING:
-    from rcilab.makers.driver import ExpectedArm, RobotAddress, StreamingDriver
+    from rcilab.makers.driver import ExpectedArm
     from rcilab.makers.parameters import ParameterGroup
+    from rcilab.makers.realman.driver.address import RealManAddress
+    from rcilab.makers.realman.driver.realman_driver import RealManDriver
     from rcilab.makers.scenario import FaultScenario
     from rcilab.model.robot_model import RobotModel
     from rcilab.sim.controller_config import ControllerConfig
     from rcilab.sim.maker_server import MakerServer
     from rcilab.sim.virtual_arm import VirtualArm
+
+_PERIOD = PUSH_PERIOD * CYCLE_TIME  # [s]
 
 
 class RealMan:
@@ -31,36 +35,45 @@ class RealMan:
     scheme = "realman"
     robots = ROBOTS
     client_port = None
-    capabilities = Capabilities(simulates=True, options=("loop_back",), longest_tool=LONGEST_TOOL)
-    timing = Timing()
+    capabilities = Capabilities(
+        simulates=True,
+        drives=True,
+        streams=True,
+        modes=("joint_position",),
+        outputs=OUTPUTS,
+        inputs=INPUTS,
+        switches_power=True,
+        setup=("tool", "load", "joints", "control"),
+        options=("loop_back",),
+        longest_tool=LONGEST_TOOL,
+    )
+    timing = Timing(state_period=_PERIOD, command_period=_PERIOD)
 
     def conditions(self) -> ConditionTable:
         """Returns the conditions of the interface."""
         return REALMAN_CONDITIONS
 
     def parameters(self, model: RobotModel) -> tuple[ParameterGroup, ...]:
-        """Returns none."""
-        return ()
+        """Returns the limits of joints and tool, and the collision stage."""
+        from rcilab.makers.realman.parameters import parameter_groups
+
+        return parameter_groups(model)
 
     def scenarios(self, model: RobotModel) -> tuple[FaultScenario, ...]:
         """Returns none."""
         return ()
 
-    def parse_address(self, text: str) -> RobotAddress:
-        """Raises an error.
+    def parse_address(self, text: str) -> RealManAddress:
+        """Returns the parts of an address, realman://HOST:PORT."""
+        from rcilab.makers.realman.driver.address import parse_address
 
-        Raises:
-            ModelError: Always: rcilab has no driver for these controllers.
-        """
-        raise _no_driver()
+        return parse_address(text)
 
-    def open_driver(self, address: str, timeout: float, expected: ExpectedArm | None) -> StreamingDriver:
-        """Raises an error.
+    def open_driver(self, address: str, timeout: float, expected: ExpectedArm | None) -> RealManDriver:
+        """Returns a connection to a controller of RealMan."""
+        from rcilab.makers.realman.driver.realman_driver import open_driver
 
-        Raises:
-            ModelError: Always: rcilab has no driver for these controllers.
-        """
-        raise _no_driver()
+        return open_driver(address, timeout, expected)
 
     def state_rounding(self, model: RobotModel) -> float:
         """Returns the resolution of joint angles on the wire, [rad]."""
@@ -75,14 +88,6 @@ class RealMan:
     def faults(self) -> type[RealManError]:
         """Returns the errors of the controllers and of their joints."""
         return RealManError
-
-
-def _no_driver() -> ModelError:
-    sentence = (
-        "RealMan's arms have no driver in rcilab: run rcilab controller and use the maker's client library, or plan, "
-        "check and draw"
-    )
-    return ModelError(sentence).coded("no_driver", model="RealMan")
 
 
 MAKER = RealMan()

@@ -22,6 +22,8 @@ _ROUNDING = 1e-12  # [rad], [rad/s].
 _LEAST_SPEED = 0.01  # Of the largest one, by which a joint at that speed still catches up; a tuning value.
 _STOP_ROOM = 2.0  # By which a stop with small jerk is longer than one with constant deceleration; a tuning value.
 _FASTEST = JointSpeed()
+_SLOW = 2e-4  # [rad/s] Relative to angles that move: a slower joint that is near follows them.
+_ROUNDED, _ROUNDED_JERK = 1.25, 3.0  # Shares of the largest acceleration and jerk; tuned for angles in 0.001 deg.
 
 
 class StopMover:
@@ -143,6 +145,8 @@ class StreamMover:
         self._filter = StreamFilter(state.q, "direct", 0.0)
         self.target = list(state.q)
         self._line_velocity = [0.0] * len(state.q)
+        self._is_off = False  # Whether it approaches the angles to follow.
+        self._before = list(state.q)  # What was to be followed in the cycle before.
         self._past: list[list[float]] = []  # The last angles, the newest first, while they are smoothed.
 
     @property
@@ -178,17 +182,28 @@ class StreamMover:
 
     def step(self) -> list[float]:
         """Advances one cycle and returns the joint angles, n plain floats, [rad]."""
-        if self.is_stationary:
+        if self._filter.mode in ("direct", "linear") and self.is_stationary:
             return list(self._axes.q)
         q = self._filter.step()
         if self._filter.mode == "linear":
             if not self._stays_on_line(q, self._filter.velocity):
                 self._step_along(q, self._velocities_through(q))
-        elif self._filter.mode == "direct" or not self._takes(q):
+        elif self._filter.mode == "direct":
             self._axes.step_to_positions(q, self._velocity)
-        q = list(self._axes.q)
-        self._past = [q, *self._past[:2]]
-        return q
+        elif self._is_off or not self._takes(q):
+            self._chase(q)
+        now = list(self._axes.q)
+        self._past, self._before = [now, *self._past[:2]], q
+        return now
+
+    def _chase(self, q: Sequence[float]) -> None:
+        """Catches up with smoothed angles, until the joints are at them and move as they do."""
+        dq = [(x - x1) / CYCLE_TIME for x, x1 in zip(q, self._before, strict=True)]
+        self._step_along(q, dq)
+        axes = self._axes
+        self._is_off = any(abs(x - x1) > _NEAR for x, x1 in zip(axes.q, q, strict=True)) or any(
+            abs(v - v1) > _SLOW for v, v1 in zip(axes.dq, dq, strict=True)
+        )
 
     def _stays_on_line(self, q: Sequence[float], dq: list[float]) -> bool:
         """Advances to these angles if the joints are next to them and may follow; returns whether they are."""
@@ -234,7 +249,8 @@ class StreamMover:
     def _takes(self, q: Sequence[float]) -> bool:
         """Advances to these angles if that is inside the bounds by differences; returns whether it is.
 
-        Otherwise the joints would brake for every target along the path.
+        Otherwise the joints would brake for every target along the path. Accelerations may be a little larger: those of
+        a plan at its bounds are rounded.
         """
         h = CYCLE_TIME
         dq: list[float] = []
@@ -242,7 +258,7 @@ class StreamMover:
         for x, x1, x2, x3, v_max, a_max, j_max in zip(q, *self._past, self._velocity, *self._bounds, strict=True):
             v, a = (x - x1) / h, (x - 2.0 * x1 + x2) / h**2
             jerk = (x - x3 - 3.0 * (x1 - x2)) / h**3
-            if not (abs(jerk) <= j_max and abs(a) <= a_max and abs(v) <= v_max):
+            if not (abs(jerk) <= _ROUNDED_JERK * j_max and abs(a) <= _ROUNDED * a_max and abs(v) <= v_max):
                 return False
             dq.append(v + 0.5 * a * h + jerk * h * h / 3.0)  # As in `derivatives_from_differences`.
             ddq.append(a + jerk * h)

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from typing import Literal, TypeAlias
 
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.sim.planner.stream_curve import StreamCurve
 
 StreamMode: TypeAlias = Literal["direct", "linear", "fit", "filter"]
 """How streamed angles are followed: to standstill at each; on straight lines through them that are rounded over a
-period, or on a curve, one period later; or low-pass filtered."""
+period, one period later; on a curve at their mean period, a few periods later; or low-pass filtered."""
 
 _LONGEST_TIME = 0.1  # [s] Time constant of the filter, and length of the mean over the curve, at smoothing 1; tuned.
 _MOST_STEPS = 3.0  # Which the joints may be behind the newest target.
@@ -38,7 +39,8 @@ class StreamFilter:
         window = max(1, round(time / CYCLE_TIME))
         self._recent = deque([list(q)] * window, window)
         self._sum = [window * x for x in q]
-        self._points = [list(q)] * 4  # Through which the curve goes; it is between the second and the third.
+        self._curve = StreamCurve(q)
+        self._before = list(q)  # The angles before the newest.
         self._period, self._since = 1, 0
         self._periods: deque[int] = deque(maxlen=_MEAN_OF)
         self._mean_period = 1.0  # [cycles] Of "linear", which irregular arrivals disturb less.
@@ -54,7 +56,7 @@ class StreamFilter:
         if self.mode == "filter":
             return max(abs(a - b) for a, b in zip(self._second, self._target, strict=True)) < 1e-9
         if self.mode == "fit":
-            return self._since > 4 * self._period + len(self._recent)
+            return self._curve.cycles_at_end > len(self._recent)
         if self.mode == "linear":
             return self._since > self._duration + self._mean_period + 1.0
         return True
@@ -79,8 +81,8 @@ class StreamFilter:
         self._duration = self._mean_period * (1.0 + _KEPT * (self._steps - 1.0))
         self._since = 0
         self._start = self._output
-        self._target = list(q)
-        self._points = [*self._points[1:], self._target]
+        self._before, self._target = self._target, list(q)
+        self._curve.take(self._target)
 
     def step(self) -> list[float]:
         """Returns the angles to follow in this cycle, n plain floats, [rad]."""
@@ -93,7 +95,7 @@ class StreamFilter:
             return self._round(self._output)
         if self.mode == "filter":
             return self._filtered()
-        return self._mean(self._on_curve())
+        return self._mean(self._curve.step())
 
     def _round(self, q: list[float]) -> list[float]:
         """Returns the mean of the straight lines over the last period, and notes its velocity."""
@@ -113,24 +115,10 @@ class StreamFilter:
         self._since += 1
         u = min(1.0, self._since / self._period)
         share = self._share
-        inputs = [a + u * (b - a) for a, b in zip(*self._points[2:], strict=True)]
+        inputs = [a + u * (b - a) for a, b in zip(self._before, self._target, strict=True)]
         self._first = [x + share * (t - x) for x, t in zip(self._first, inputs, strict=True)]
         self._second = [x + share * (t - x) for x, t in zip(self._second, self._first, strict=True)]
         return self._target if self.is_settled else self._second
-
-    def _on_curve(self) -> list[float]:
-        """Returns the next point of the uniform cubic B-spline of the points."""
-        phase = self._since % self._period
-        if phase == 0 and 0 < self._since < 4 * self._period:  # No further angles: the curve ends at the last ones.
-            self._points = [*self._points[1:], self._target]
-        self._since += 1
-        u = (phase + 1) / self._period
-        left = 1.0 - u
-        a = left * left * left / 6.0
-        b = (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0
-        c = (3.0 * left * left * left - 6.0 * left * left + 4.0) / 6.0
-        d = u * u * u / 6.0
-        return [a * p + b * q + c * r + d * s for p, q, r, s in zip(*self._points, strict=True)]
 
     def _mean(self, q: list[float]) -> list[float]:
         oldest = self._recent[0]

@@ -91,3 +91,17 @@ def test_angles_outside_the_range_are_refused(model: RobotModel) -> None:
     refusal = planner_of(model).servo_joints([9.0] * model.n)
     assert refusal is not None
     assert refusal.reason is RefusalReason.JOINT_RANGE
+
+
+def test_a_curve_through_streamed_angles_does_not_show_when_each_of_them_came(model: RobotModel) -> None:
+    """They come up to 3 ms late."""
+    late = np.random.default_rng(1).integers(0, 4, size=400)
+    actions = {
+        PERIOD * step + int(late[step]): lambda planner, step=step: planner.follow_joints(
+            sine(model, PERIOD * step).tolist(), mode="fit"
+        )
+        for step in range(400)
+    }
+    rows, _ = drive(planner_of(model), actions)
+    wanted = np.array([sine(model, cycle) for cycle in range(400, 1500)])
+    assert min(np.abs(rows[500:1500] - wanted[100 - delay :][:1000]).max() for delay in range(50)) < 1e-3

@@ -13,7 +13,7 @@ from struct import Struct
 
 from rcilab.core.errors import ConnectionLostError
 from rcilab.makers.franka.driver.address import FciAddress
-from rcilab.makers.network import find_route
+from rcilab.makers.network import find_route, no_robot_error
 
 _CONNECT = Struct("<IIIHH")
 _ANSWER = Struct("<IIIBH")
@@ -38,17 +38,12 @@ def find_version(address: FciAddress, version: int, timeout: float) -> int:
         try:
             tcp.connect((route.host, address.port))
         except OSError as error:
-            spent = time.monotonic() - start
-            reason = (
-                f"did not answer within {timeout:g} s"
-                if isinstance(error, TimeoutError)
-                else f"{error.strerror or error} after {spent:.1f} s of {timeout:g} s"
-            )
-            raise ConnectionLostError(
-                f"no robot at {address} ({reason}); check that it is switched on, that FCI is activated in Desk and "
+            advice = (
+                "check that it is switched on, that FCI is activated in Desk and "
                 "the joints are unlocked, that the IP address is the one shown there, and the cable; a virtual one is "
                 "started with, for example: rcilab controller --model FR3"
-            ).coded("no_robot", address=str(address)) from error
+            )
+            raise no_robot_error(address, error, time.monotonic() - start, timeout, advice) from error
         deadline = time.monotonic() + timeout
         try:
             tcp.sendall(_CONNECT.pack(0, 0, _CONNECT.size, version, udp.getsockname()[1]))

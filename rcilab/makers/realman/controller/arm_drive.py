@@ -91,6 +91,11 @@ class ArmDrive:
         arm.configure(replace(arm.parameters, joint_lower=lower, joint_upper=upper))
         self._restart()
 
+    def release(self) -> None:
+        """Ends the motion that lingers after its end, before the arm gets another tool; only while it is still."""
+        self.arm.discard_motion()
+        self.arm.is_monitored = False
+
     def simulate(self, on: bool) -> None:
         """Begins or ends to show motions only; a simulated arm begins where the real one is."""
         if on is not self.is_simulated:

@@ -9,9 +9,10 @@ from typing import Any
 
 from rcilab.core.errors import InvalidValueError
 from rcilab.i18n.translator import Remark
+from rcilab.makers.realman.bounds import FIRST_TOOL_FRAME, FIRST_WORK_FRAME
 from rcilab.makers.realman.controller.handler import Getter, Setter, setter
 from rcilab.makers.realman.controller.realman_controller import RealManController
-from rcilab.makers.realman.controller.settings import ARM_TIP, WORLD, ToolFrame
+from rcilab.makers.realman.controller.settings import ToolFrame
 from rcilab.makers.realman.errors import RealManError
 from rcilab.makers.realman.wire.line import Request
 from rcilab.makers.realman.wire.units import microns_from_lengths, pose_from_wire, wire_from_pose
@@ -57,7 +58,7 @@ def _add_work_frame(controller: RealManController, request: Request) -> None:
 
 def _update_work_frame(controller: RealManController, request: Request) -> None:
     name = _require_known(controller, request, "frame_name")
-    _require_changeable(name, WORLD)
+    _require_changeable(name, FIRST_WORK_FRAME)
     pose = pose_from_wire(request.integers("frame_pose", 6))
     controller.change(controller.settings.with_work_frame(name, pose))
 
@@ -69,10 +70,10 @@ def _change_work_frame(controller: RealManController, request: Request) -> None:
 
 def _delete_work_frame(controller: RealManController, request: Request) -> None:
     name = _require_known(controller, request, "frame_name")
-    _require_changeable(name, WORLD)
+    _require_changeable(name, FIRST_WORK_FRAME)
     settings = controller.settings
     frames = {key: pose for key, pose in settings.work_frames.items() if key != name}
-    current = WORLD if settings.work_frame == name else settings.work_frame
+    current = FIRST_WORK_FRAME if settings.work_frame == name else settings.work_frame
     controller.change(replace(settings, work_frames=MappingProxyType(frames), work_frame=current))
 
 
@@ -93,7 +94,7 @@ def _add_tool(controller: RealManController, request: Request) -> None:
 
 def _update_tool(controller: RealManController, request: Request) -> None:
     name = _require_known(controller, request, "tool_name")
-    _require_changeable(name, ARM_TIP)
+    _require_changeable(name, FIRST_TOOL_FRAME)
     controller.change(controller.settings.with_tool(name, _read_tool(request)))
 
 
@@ -106,10 +107,10 @@ def _change_tool(controller: RealManController, request: Request) -> None:
 
 def _delete_tool(controller: RealManController, request: Request) -> None:
     name = _require_known(controller, request, "tool_name")
-    _require_changeable(name, ARM_TIP)
+    _require_changeable(name, FIRST_TOOL_FRAME)
     settings = controller.settings
     frames = {key: tool for key, tool in settings.tool_frames.items() if key != name}
-    current = ARM_TIP if settings.tool_frame == name else settings.tool_frame
+    current = FIRST_TOOL_FRAME if settings.tool_frame == name else settings.tool_frame
     controller.change(replace(settings, tool_frames=MappingProxyType(frames), tool_frame=current))
 
 

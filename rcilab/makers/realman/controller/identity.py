@@ -7,6 +7,7 @@ from math import degrees
 from typing import Final, Literal, TypeAlias
 
 from rcilab.core.errors import InvalidValueError
+from rcilab.makers.realman.wire.identity import product_version
 from rcilab.robots.description import DhRow, RobotDescription
 
 Generation: TypeAlias = Literal[3, 4]
@@ -28,11 +29,6 @@ def require_generation(number: int | None) -> Generation:
             return 4
         case _:
             raise InvalidValueError("generation", number, "must be 3 or 4 for this arm")
-
-
-def product_version(name: str) -> str:
-    """Returns the model as a client reads it, without a force sensor, such as "RML63III-B"."""
-    return f"{name.replace('-', '')}-B"
 
 
 def software_info(name: str, generation: Generation) -> dict[str, object]:

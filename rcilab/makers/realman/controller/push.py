@@ -13,12 +13,11 @@ from rcilab.makers.realman.controller.state_requests import (
     joint_currents,
 )
 from rcilab.makers.realman.wire.line import encode_answer
-from rcilab.makers.realman.wire.units import microns_from_lengths, quaternion_to_wire
+from rcilab.makers.realman.wire.units import SPEED_STEP, microns_from_lengths, quaternion_to_wire
 from rcilab.sim.planner import PlannerState
 
 _MOVES = {"movej": "move_J", "movel": "move_L", "movec": "move_C", "moves": "move_S"}
 _STREAMS = {"joint": "move_through_joint", "pose": "move_through_pose"}
-_SPEED_STEP = 0.12  # [deg/s] 0.02 RPM.
 
 
 def arm_status(controller: RealManController) -> str:
@@ -48,7 +47,7 @@ def encode_push(controller: RealManController, arm_ip: str) -> bytes:
     pose = controller.T_work_tool
     joints = {
         "joint_position": joint_angles(controller),
-        "joint_speed": [round(degrees(dq) / _SPEED_STEP) for dq in controller.arm.signals.measured.dq.tolist()],
+        "joint_speed": [round(degrees(dq) / SPEED_STEP) for dq in controller.arm.signals.measured.dq.tolist()],
         "joint_current": joint_currents(controller),
         "joint_temperature": [TEMPERATURE] * n,
         "joint_voltage": [VOLTAGE] * n,

@@ -20,12 +20,13 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
 from rcilab.i18n.translator import Remark
+from rcilab.makers.realman.bounds import MOST_SENSITIVE
 from rcilab.makers.realman.controller.arm_drive import ArmDrive
 from rcilab.makers.realman.controller.fault_of import REFUSALS, errors_of
 from rcilab.makers.realman.controller.flash import Flash
 from rcilab.makers.realman.controller.joint_parameters import RECOMMENDED_RATIO, JointParameters, require_joint
 from rcilab.makers.realman.controller.reporter import report_state
-from rcilab.makers.realman.controller.settings import MOST_SENSITIVE, SIGNALS, Settings, ToolFrame
+from rcilab.makers.realman.controller.settings import SIGNALS, Settings, ToolFrame
 from rcilab.makers.realman.controller.trajectories import Trajectory, TrajectoryQueue
 from rcilab.makers.realman.errors import JOINT_BITS, RealManError
 from rcilab.model.robot_model import RobotModel
@@ -143,7 +144,7 @@ class RealManController:
     @property
     def phase_name(self) -> str:
         """What it does: "idle", "moving", "paused" or "fault"."""
-        if any(word & ~RealManError.JOINT_POSITION_STEP for word in self.joint_errors) or any(
+        if any(word & ~RealManError.JOINT_POSITION_STEP.code for word in self.joint_errors) or any(
             error not in _TRANSIENT for error in self.system_errors
         ):
             return "fault"
@@ -155,7 +156,7 @@ class RealManController:
         """The errors that stopped the arm, of system and joints; not those of refused commands."""
         if not (self.system_errors or any(self.joint_errors)):
             return ()
-        bits = [error for error in JOINT_BITS if any(word & error == error for word in self.joint_errors)]
+        bits = [error for error in JOINT_BITS if any(word & error.code == error.code for word in self.joint_errors)]
         return (*(error for error in self.system_errors if error not in _TRANSIENT), *sorted(bits))
 
     @property
@@ -312,7 +313,7 @@ class RealManController:
         """Shows an error, of a joint if it is one of its bits."""
         self.reason = reason
         if joint:
-            self.joint_errors[joint - 1] |= error
+            self.joint_errors[joint - 1] |= error.code
         elif error not in self.system_errors:
             self.system_errors = (*self.system_errors, error)
 
@@ -429,7 +430,7 @@ class RealManController:
 
     def _require_no_error(self, joint: int, word: int | None = None) -> None:
         word = self.joint_errors[joint - 1] if word is None else word
-        if word & ~RealManError.JOINT_POSITION_STEP:
+        if word & ~RealManError.JOINT_POSITION_STEP.code:
             raise InvalidValueError("joint", joint, f"has the error 0x{word:04X}; set_joint_clear_err clears it")
 
     def _keep(self, parameters: JointParameters) -> None:
@@ -448,6 +449,7 @@ class RealManController:
         part = np.inf if not stage else 1.0 - stage / (MOST_SENSITIVE + 1.0)
         thresholds = tuple((part * arm.model.limits.joint.torque).tolist())
         parameters = replace(arm.parameters, collision_thresholds=thresholds)
+        self.drive.release()
         if tool is not self._tool:
             parameters = replace(parameters, T_flange_tool=tool.T_flange_tool, load=tool.load)
             self._tool = tool

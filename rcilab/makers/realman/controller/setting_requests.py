@@ -9,13 +9,13 @@ from types import MappingProxyType
 from typing import Any
 
 from rcilab.core.errors import InvalidValueError
+from rcilab.makers.realman.bounds import FASTEST_TOOL, MOST_SENSITIVE, STRONGEST_TOOL
 from rcilab.makers.realman.controller.handler import Getter, Setter, setter
 from rcilab.makers.realman.controller.realman_controller import RealManController
-from rcilab.makers.realman.controller.settings import MOST_SENSITIVE, SIGNALS, PushSettings, TipSpeeds
+from rcilab.makers.realman.controller.settings import SIGNALS, PushSettings, TipSpeeds
 from rcilab.makers.realman.wire.line import Request
 
 _MILLI = 1e-3
-_FASTEST = 10.0  # [m/s], [m/s^2], [rad/s], [rad/s^2] rcilab's own bound, ten times that for accelerations.
 _LONGEST_CYCLE = 1000  # [5 ms]
 _OUTPUT_MODE = 1
 
@@ -25,7 +25,7 @@ def _tip_setter(name: str) -> Setter:
 
     def run(controller: RealManController, request: Request) -> None:
         value = _MILLI * request.integer(field)
-        bound = _FASTEST * (10.0 if name.endswith("acc") else 1.0)
+        bound = STRONGEST_TOOL if name.endswith("acc") else FASTEST_TOOL
         if not 0.0 < value <= bound:
             raise InvalidValueError(field, value, f"must be above 0, up to {bound:g}")
         tip = replace(controller.settings.tip, **{name: value})

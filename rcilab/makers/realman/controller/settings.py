@@ -16,7 +16,10 @@ from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.makers.realman.bounds import (
     ANGULAR_ACCELERATION,
     ANGULAR_SPEED,
+    FIRST_TOOL_FRAME,
+    FIRST_WORK_FRAME,
     HEAVIEST_LOAD,
+    INPUTS,
     LINE_ACCELERATION,
     LINE_SPEED,
     LONGEST_TOOL,
@@ -24,16 +27,10 @@ from rcilab.makers.realman.bounds import (
 )
 from rcilab.model.dynamics.payload import NO_LOAD, Payload
 
-WORLD: Final = "World"
-"""Work frame of a new controller."""
-ARM_TIP: Final = "Arm_Tip"
-"""Tool frame of a new controller."""
 MOST_FRAMES: Final = 10
 """Of either kind, as of the real controller."""
-SIGNALS: Final = 4
+SIGNALS: Final = len(INPUTS)
 """Digital inputs and outputs of the controller."""
-MOST_SENSITIVE: Final = 8
-"""Collision stage; 0 is off."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -112,10 +109,12 @@ class PushSettings:
 class Settings:
     """All settings of a client that are gone after a restart."""
 
-    work_frames: Mapping[str, Pose] = field(default_factory=lambda: MappingProxyType({WORLD: IDENTITY}))
-    work_frame: str = WORLD
-    tool_frames: Mapping[str, ToolFrame] = field(default_factory=lambda: MappingProxyType({ARM_TIP: ToolFrame()}))
-    tool_frame: str = ARM_TIP
+    work_frames: Mapping[str, Pose] = field(default_factory=lambda: MappingProxyType({FIRST_WORK_FRAME: IDENTITY}))
+    work_frame: str = FIRST_WORK_FRAME
+    tool_frames: Mapping[str, ToolFrame] = field(
+        default_factory=lambda: MappingProxyType({FIRST_TOOL_FRAME: ToolFrame()})
+    )
+    tool_frame: str = FIRST_TOOL_FRAME
     tip: TipSpeeds = TipSpeeds()
     collision_stage: int = 0
     teach_in_tool: bool = False

@@ -21,7 +21,7 @@ _SECONDS_A_DAY, _CYCLES_A_SECOND = 86400, 1000
 
 def error_codes(controller: RealManController) -> list[int]:
     """Returns the errors of the system; 0 without one."""
-    return [int(error) for error in controller.system_errors] or [0]
+    return [error.code for error in controller.system_errors] or [0]
 
 
 def joint_angles(controller: RealManController) -> list[int]:

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import degrees, pi, radians
+from math import copysign, degrees, pi, radians
+from typing import Final
 
 from rcilab.core.spatial import Pose
 
+SPEED_STEP: Final = 0.12
+"""Unit of the joint speeds that are pushed, [deg/s]: 0.02 RPM, by the maker's page."""
+
 _MILLI, _MICRO = 1e-3, 1e-6
+_PART = 0.3  # Of a unit of the wire; the client library truncates, and its numbers are of single precision.
 _RPM = 2.0 * pi / 60.0  # [rad/s]
 
 
@@ -19,6 +24,27 @@ def angles_from_millidegrees(values: Iterable[int]) -> tuple[float, ...]:
 def millidegrees_from_angles(angles: Iterable[float]) -> list[int]:
     """Returns angles in 0.001 deg."""
     return [round(degrees(angle) / _MILLI) for angle in angles]
+
+
+def degrees_for_client(angles: Iterable[float]) -> list[float]:
+    """Returns angles, [deg], that the client library sends as the nearest numbers of the wire: it truncates them."""
+    return [_MILLI * (number + copysign(_PART, number)) for number in millidegrees_from_angles(angles)]
+
+
+def pose_from_client(values: Sequence[float]) -> Pose:
+    """Returns the pose of x, y, z, [m], and rx, ry, rz, [rad]: R = Rz Ry Rx."""
+    return Pose.from_rpy(list(values[:3]), list(values[3:]))
+
+
+def pose_for_client(pose: Pose) -> list[float]:
+    """Returns x, y, z, [m], and rx, ry, rz, [rad], that the client library sends as the nearest numbers of the wire."""
+    units = (*(_MICRO,) * 3, *(_MILLI,) * 3)
+    return [unit * (number + copysign(_PART, number)) for unit, number in zip(units, wire_from_pose(pose), strict=True)]
+
+
+def speed_for_client(speed: float) -> float:
+    """Returns a speed of a joint, [deg/s], or an acceleration, that the client library sends as the nearest number."""
+    return degrees(_MILLI * _RPM) * (millirpm_from_speed(speed) + _PART)
 
 
 def speed_from_millirpm(value: int) -> float:

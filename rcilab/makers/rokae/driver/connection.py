@@ -13,7 +13,7 @@ from typing import Any
 
 from rcilab.core.errors import ConnectionLostError, DeadlineError, DecodeError
 from rcilab.core.state import RobotState
-from rcilab.makers.network import RECEIVE_BUFFER
+from rcilab.makers.network import RECEIVE_BUFFER, no_robot_error
 from rcilab.makers.rokae.driver.address import RciAddress, Route, choose_route
 from rcilab.makers.rokae.wire import (
     CommandPacket,
@@ -360,15 +360,10 @@ def _connect_tcp(address: RciAddress, route: Route, timeout: float) -> socket.so
         tcp.setblocking(False)
     except OSError as error:
         tcp.close()
-        spent = time.monotonic() - start
-        reason = (
-            f"did not answer within {timeout:g} s"
-            if isinstance(error, TimeoutError)
-            else f"{error.strerror or error} after {spent:.1f} s of {timeout:g} s"
-        )
-        raise ConnectionLostError(
-            f"no robot at {address} ({reason}); check that it is switched on, that its IP address and port are those "
+        advice = (
+            "check that it is switched on, that its IP address and port are those "
             "of the teach pendant's RCI page with RCI enabled there, and that the cable and no firewall is in between; "
             "a virtual one is started with, for example: rcilab controller --model xMatePro7"
-        ).coded("no_robot", address=str(address)) from error
+        )
+        raise no_robot_error(address, error, time.monotonic() - start, timeout, advice) from error
     return tcp

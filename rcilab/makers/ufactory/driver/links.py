@@ -14,7 +14,7 @@ from struct import Struct
 from typing import NamedTuple
 
 from rcilab.core.errors import ConnectionLostError, DecodeError, ModelError
-from rcilab.makers.network import find_route
+from rcilab.makers.network import find_route, no_robot_error
 from rcilab.makers.ufactory.driver.address import XArmAddress
 from rcilab.makers.ufactory.robots import ROBOTS
 from rcilab.makers.ufactory.wire.frame import PRIVATE, FrameReader, decode_frame
@@ -72,17 +72,12 @@ def find_arm(address: XArmAddress, timeout: float) -> tuple[str, Endpoint]:
             endpoint = endpoint._replace(is_local=True)
             link = endpoint.connect(address.port, timeout)
     except OSError as error:
-        spent = time.monotonic() - start
-        reason = (
-            f"did not answer within {timeout:g} s"
-            if isinstance(error, TimeoutError)
-            else f"{error.strerror or error} after {spent:.1f} s of {timeout:g} s"
-        )
-        raise ConnectionLostError(
-            f"no robot at {address} ({reason}); check that the control box is switched on, that the IP address is the "
+        advice = (
+            "check that the control box is switched on, that the IP address is the "
             "one on its label, and the cable; a virtual one is started with, for example: rcilab controller --model "
             "xArm7"
-        ).coded("no_robot", address=str(address)) from error
+        )
+        raise no_robot_error(address, error, time.monotonic() - start, timeout, advice) from error
     with link:
         try:
             version = _read_version(link)

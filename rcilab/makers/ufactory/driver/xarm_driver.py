@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from rcilab.core.command import Command, CommandFilter, JointPosition
@@ -11,13 +10,14 @@ from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, RobotMode, RobotState
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ConfiguredArm, ExpectedArm, GuideKind, GuideSpace, RequestLock, SafetyStopReason
+from rcilab.makers.fault_report import describe_faults
 from rcilab.makers.known_setup import with_reported_load, with_reported_tool
+from rcilab.makers.library_connection import LibraryDriver
 from rcilab.makers.ufactory.bounds import SINGLE_PRECISION
 from rcilab.makers.ufactory.driver.address import XArmAddress, parse_address
 from rcilab.makers.ufactory.driver.client import XArmClient, describe_error
 from rcilab.makers.ufactory.driver.configuration import send_configuration
 from rcilab.makers.ufactory.driver.connection import XArmConnection
-from rcilab.makers.ufactory.driver.fault_report import describe_faults
 from rcilab.makers.ufactory.driver.library import load_client_library
 from rcilab.makers.ufactory.driver.links import find_arm
 from rcilab.makers.ufactory.driver.report_receiver import open_receiver
@@ -61,7 +61,7 @@ def open_driver(address: str, timeout: float, expected: ExpectedArm | None) -> X
     return driver
 
 
-class XArmDriver:
+class XArmDriver(LibraryDriver[bytes]):
     """A connection to a UFACTORY controller with the interface of `StreamingDriver`.
 
     Motions are targets of mode 1, one for every report of 200 Hz: the arm's clock is that of the motion.
@@ -79,11 +79,9 @@ class XArmDriver:
     recovery_silence = 0.0
 
     def __init__(self, connection: XArmConnection, address: XArmAddress, arm_name: str) -> None:
-        self.name, self.n = connection.name, connection.n
-        self.arm_name = arm_name
+        world_port = address.world_port
+        super().__init__(connection, arm_name, None if world_port is None else (address.host, world_port))
         self.is_local = address.is_here
-        self.simulation_address = None if address.world_port is None else (address.host, address.world_port)
-        self.poll = connection.poll
         self._link = connection
         self._settings = XArmSettings(connection, arm_name)
 
@@ -91,30 +89,6 @@ class XArmDriver:
     def load(self) -> Payload:
         """The load that is set."""
         return self._settings.load
-
-    @property
-    def latest(self) -> RobotState | None:
-        """The newest state."""
-        return self._link.latest
-
-    @property
-    def received_ns(self) -> int:
-        """When it arrived, monotonic, [ns]."""
-        return self._link.received_ns
-
-    @property
-    def age(self) -> float:
-        """Upper bound of its age, [s]."""
-        return self._link.age
-
-    @property
-    def on_states(self) -> Callable[[list[RobotState]], None]:
-        """Called with the states that arrive while something else is awaited."""
-        return self._link.on_states
-
-    @on_states.setter
-    def on_states(self, listener: Callable[[list[RobotState]], None]) -> None:
-        self._link.on_states = listener
 
     def open_commands(self, arm: ConfiguredArm, lock: RequestLock) -> XArmSessionCommands:
         """Returns the commands of the interface for a session."""

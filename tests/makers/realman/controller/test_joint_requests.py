@@ -76,7 +76,7 @@ def test_an_enabled_joint_one_with_an_error_and_a_wrong_joint_refuse_changes(com
     assert bench.ask(command, **fields)[field] is False
     assert "disable it" in bench.logged[-1][1]
     bench.ask("set_joint_en_state", joint_en_state=[2, 0])
-    bench.controller.joint_errors[1] = RealManError.JOINT_OVERCURRENT
+    bench.controller.joint_errors[1] = RealManError.JOINT_OVERCURRENT.code
     assert bench.ask(command, **fields)[field] is False
     assert "0x0040" in bench.logged[-1][1]
     assert bench.ask("set_joint_en_state", joint_en_state=[2, 1])["joint_en_state"] is False
@@ -112,7 +112,7 @@ def test_new_limits_hold_for_checks_and_motions():
     bench.ask("set_joint_en_state", joint_en_state=[1, 1])
     q = bench.q
     assert bench.ask("movej", joint=[31000, *q[1:]], v=100)["receive_state"] is False
-    assert bench.err == [RealManError.TARGET_OVER_LIMIT]
+    assert bench.err == [RealManError.TARGET_OVER_LIMIT.code]
     assert bench.ask("movej", joint=[29000, *q[1:]], v=100)["receive_state"] is True
     speeds = []
     while not bench.events:
@@ -143,7 +143,7 @@ def test_a_joint_that_moves_is_not_enabled_and_a_disabled_one_does_not_move():
     bench = disabled()
     q = bench.q
     assert bench.ask("movej", joint=[10000, *q[1:]], v=50)["receive_state"] is False
-    assert bench.err == [RealManError.JOINT_DISABLED]
+    assert bench.err == [RealManError.JOINT_DISABLED.code]
     bench.ask("set_joint_en_state", joint_en_state=[2, 1])
     assert bench.ask("movej", joint=[10000, *q[1:]], v=50)["receive_state"] is True
     assert bench.err == [0]

@@ -193,10 +193,10 @@ def test_what_cannot_be_reached_is_refused_with_its_error_until_the_next_command
     bench = Bench()
     start = bench.pose
     assert bench.ask("movej", joint=[179000, *bench.q[1:]], v=50)["receive_state"] is False
-    assert bench.err == [RealManError.TARGET_OVER_LIMIT]
+    assert bench.err == [RealManError.TARGET_OVER_LIMIT.code]
     bench.ask("movel", pose=moved(start, x=900000), v=50)
     assert bench.run_until_event()["trajectory_state"] is False
-    assert bench.err == [RealManError.UNREACHABLE]
+    assert bench.err == [RealManError.UNREACHABLE.code]
     assert bench.controller.faults == ()
     bench.ask("movel", pose=moved(start, z=1000), v=50)
     assert bench.err == [0]
@@ -223,7 +223,7 @@ def test_a_streamed_step_of_more_than_ten_degrees_is_not_followed_and_sets_the_j
     bench.send("movej_canfd", joint=[q[0] + 10001, *q[1:]], follow=True)
     bench.run(100)
     assert bench.q == q
-    assert bench.ask("get_joint_err_flag")["err_flag"][0] == RealManError.JOINT_POSITION_STEP
+    assert bench.ask("get_joint_err_flag")["err_flag"][0] == RealManError.JOINT_POSITION_STEP.code
     bench.send("movej_canfd", joint=[q[0] + 9000, *q[1:]], follow=True)
     bench.run(2000)
     assert bench.q[0] == pytest.approx(q[0] + 9000, abs=2)
@@ -282,7 +282,7 @@ def test_poses_are_in_the_work_frame_and_of_the_tool():
     assert bench.run_until_event()["trajectory_state"] is True
     np.testing.assert_allclose(bench.pose[:3], moved(start, x=-100000, z=-50000)[:3], atol=1)
     assert bench.ask("set_change_tool_frame", tool_name="none")["change_tool_frame"] is False
-    assert bench.err == [RealManError.NO_TOOL_FRAME]
+    assert bench.err == [RealManError.NO_TOOL_FRAME.code]
     assert bench.ask("get_tool_frame", tool_name="pen") == {
         "state": "given_tool_frame",
         "tool_name": "pen",
@@ -327,7 +327,7 @@ def test_links_that_would_touch_stop_the_arm_until_the_error_is_cleared():
     folded = [0, -130000, 135000, 0, 128000, 0]
     assert bench.ask("movej", joint=folded, v=50)["receive_state"] is True
     assert bench.run_until_event()["trajectory_state"] is False
-    assert bench.err == [RealManError.SELF_COLLISION]
+    assert bench.err == [RealManError.SELF_COLLISION.code]
     bench.run(1000)
     assert bench.ask("movej", joint=FRONT["RM65"], v=50)["receive_state"] is False
     assert bench.ask("clear_system_err")["clear_state"] is True
@@ -377,3 +377,19 @@ def test_states_are_pushed_at_their_period():
     np.testing.assert_allclose(state["waypoint"]["position"], bench.pose[:3], atol=2000)
     assert max(map(abs, state["joint_status"]["joint_speed"])) > 0
     assert state["err"] == [0]
+
+
+def test_the_tool_can_be_changed_right_after_a_motion():
+    bench = Bench()
+    bench.ask(
+        "set_manual_tool_frame", tool_name="long", tool_pose=[0, 0, 100000, 0, 0, 0], payload=500, position=[0] * 3
+    )
+    bench.ask("movej", joint=[5000, -20000, -70000, 0, -90000, 0], v=50)
+    assert bench.run_until_event()["trajectory_state"] is True
+    bench.run(2)
+    before = bench.pose[2]
+    assert bench.ask("set_change_tool_frame", tool_name="long")["change_tool_frame"] is True
+    bench.run(10)
+    assert bench.pose[2] == pytest.approx(before - 100000, abs=10)
+    bench.ask("movej", joint=FRONT["RM65"], v=50)
+    assert bench.run_until_event()["trajectory_state"] is True

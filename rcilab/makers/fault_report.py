@@ -1,4 +1,4 @@
-"""The diagnosis of a motion that the controller stopped: error, what to do."""
+"""The diagnosis of a motion that a controller stopped, by its errors alone: what they are and what to do."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.core.arrays import JointVector
+from rcilab.core.fault import FaultCode
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode
 from rcilab.i18n.translator import Remark
 from rcilab.makers.driver import FaultReport
-from rcilab.makers.ufactory.errors import UfactoryError
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
@@ -24,7 +24,7 @@ _HELD = "error.run holds the motion"
 
 
 def describe_faults(
-    faults: Iterable[UfactoryError],
+    faults: Iterable[FaultCode],
     record: NDArray[np.void],
     t: float,
     model: RobotModel,

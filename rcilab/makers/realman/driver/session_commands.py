@@ -1,0 +1,105 @@
+"""The requests of the interface in a session, `robot.realman`: they take its lock and keep its model up to date."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from numpy.typing import ArrayLike
+
+from rcilab.core.errors import ModelError
+from rcilab.core.spatial import Pose
+from rcilab.makers.configuration import RobotConfiguration
+from rcilab.makers.driver import ConfiguredArm, RequestLock
+from rcilab.makers.realman.driver.configuration import send_configuration
+from rcilab.makers.realman.driver.connection import RealManConnection
+from rcilab.makers.realman.driver.settings import RealManSettings
+from rcilab.model.dynamics.payload import Payload
+
+
+class RealManSessionCommands(RealManSettings):
+    """The requests for the user of a session; while a motion runs, all but `pause`, `resume` and `stop` are refused.
+
+    Args:
+        connection: The connection.
+        arm: The session's configuration.
+        lock: The session's lock.
+    """
+
+    def __init__(self, connection: RealManConnection, arm: ConfiguredArm, lock: RequestLock) -> None:
+        super().__init__(connection, arm.model.name)
+        self._arm = arm
+        self._lock = lock
+
+    def configure(self, configuration: RobotConfiguration) -> None:
+        """Sends a configuration; after a refusal, earlier parts are in force."""
+        send_configuration(self, configuration)
+
+    def set_tool(self, T_flange_tool: Pose) -> None:
+        """Sets the pose of the tool in the flange frame; the session's `model` has it from then on."""
+        with self._lock.acquire("set_tool"):
+            model = self._arm.model.with_tool(T_flange_tool)
+            super().set_tool(T_flange_tool)
+            self._arm.model = model
+
+    def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
+        """Sets the load; the session's `model` has it from then on.
+
+        Args:
+            mass: [kg].
+            center_of_mass: In the flange frame, shape (3,), [m].
+            inertia: About the centre of mass, shape (3, 3), [kg m^2]; only the model has it.
+        """
+        with self._lock.acquire("set_load"):
+            load = Payload(mass=mass, center_of_mass=center_of_mass, inertia=inertia)  # type: ignore[arg-type]
+            model = self._arm.model.with_load(load)
+            super().set_load(mass, center_of_mass, inertia)
+            self._arm.model = model
+
+    def set_joint_ranges(self, lower: ArrayLike, upper: ArrayLike) -> None:
+        """Sets the ranges of the joints; the session's `model` has them from then on.
+
+        Args:
+            lower: Shape (n,), [rad], inside the arm's own range.
+            upper: Shape (n,), [rad].
+        """
+        with self._lock.acquire("set_joint_ranges"):
+            model = self._arm.model.with_joint_limits(lower, upper)
+            super().set_joint_ranges(lower, upper)
+            self._arm.model = model
+
+    def set_joint_velocities(self, velocity: ArrayLike) -> None:
+        """Sets the largest speeds of the joints, shape (n,), [rad/s]; the session's `model` has them from then on."""
+        with self._lock.acquire("set_joint_velocities"):
+            super().set_joint_velocities(velocity)
+            self._arm.model = self.with_limits(self._arm.model)
+
+    def set_joint_accelerations(self, acceleration: ArrayLike) -> None:
+        """Sets the largest accelerations of the joints, shape (n,), [rad/s^2]; the session's `model` has them then."""
+        with self._lock.acquire("set_joint_accelerations"):
+            super().set_joint_accelerations(acceleration)
+            self._arm.model = self.with_limits(self._arm.model)
+
+    def set_tool_limits(
+        self, velocity: float, acceleration: float, rotation_velocity: float, rotation_acceleration: float
+    ) -> None:
+        """Sets the largest speeds and accelerations of the tool; the session's `model` has them from then on.
+
+        Args:
+            velocity: Up to 10 m/s.
+            acceleration: Up to 100 m/s^2.
+            rotation_velocity: Up to 10 rad/s.
+            rotation_acceleration: Up to 100 rad/s^2.
+        """
+        with self._lock.acquire("set_tool_limits"):
+            super().set_tool_limits(velocity, acceleration, rotation_velocity, rotation_acceleration)
+            self._arm.model = self.with_limits(self._arm.model)
+
+    def reboot(self) -> None:
+        """Raises an error: see the driver."""
+        raise ModelError("a RealMan controller is not restarted over its interface: switch it off and on")
+
+    @contextmanager
+    def _request(self, name: str) -> Iterator[None]:
+        with self._lock.acquire(name):
+            yield
