@@ -46,6 +46,7 @@ def advise(
     count: int,
     ratio: float,
     is_off_start: bool,
+    is_isolated: bool = True,
     soft_limit: float | None = None,
     is_near_end: bool = False,
 ) -> Phrase:
@@ -58,6 +59,7 @@ def advise(
         count: Number of consecutive violating samples.
         ratio: Ratio of the worst value to the bound.
         is_off_start: Whether the motion does not start at the start state of the check.
+        is_isolated: Whether the values before and after these samples are far from the worst one.
         soft_limit: The soft limit that the joint exceeds, [rad]; None if it exceeds the arm's own range.
         is_near_end: Whether the bound is lower than elsewhere, because the joint is near the end of its range.
     """
@@ -82,7 +84,7 @@ def advise(
     if row >= len(motion):
         return Phrase("advice.moving_end")
     # One displaced sample changes two first differences, three second and four third ones.
-    if not isfinite(ratio) or (count <= condition.order + 1 and motion.law == "samples"):
+    if not isfinite(ratio) or (is_isolated and count <= condition.order + 1 and motion.law == "samples"):
         return Phrase("advice.jump")
     if is_near_end:
         return Phrase("advice.near_end", factor=f"{ceil(1000.0 * ratio) / 1000.0:.3f}")

@@ -31,6 +31,8 @@ from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.bounds import RECOVERY_RANGE, range_from
 from rcilab.motion.motion import Motion, require_motion
 
+_NEAR = 0.2  # Of the worst value: a smooth signal comes so near in the cycle before it or after; a tuning value.
+
 
 def check(
     motion: Motion,
@@ -345,6 +347,7 @@ class _MotionChecker:
             count=end - begin,
             ratio=worst,
             is_off_start=is_off_start,
+            is_isolated=_is_isolated(values[:, column], begin, end, value),
             soft_limit=soft_limit,
             is_near_end=bool(is_near_end),
         )
@@ -377,6 +380,11 @@ def _nearest_bound(value: float, lower: Array, upper: Array, row: int, column: i
         return float((upper if value >= 0.0 else lower)[row, column])
     low, high = float(lower[column]), float(upper[column])
     return high if value >= (low + high) / 2.0 else low
+
+
+def _is_isolated(values: Array, begin: int, end: int, worst: float) -> bool:
+    """Returns whether the values next to some rows are far from the worst of these: a sample there is displaced."""
+    return not any(abs(values[row] - worst) < _NEAR * abs(worst) for row in (begin - 1, end) if 0 <= row < len(values))
 
 
 def _axis(condition: Condition, column: int) -> int:

@@ -237,8 +237,9 @@ def _read_torques(run: Run) -> tuple[Motion, Array, int]:
     if run.has_playout:
         is_sent |= (rows["sent_ns"] != 0) & (run.setup.mode == "torque")  # Also of those that are not numbers.
         played, sources = played_commands(rows)
-        if faulty.size and sources.size:
-            is_sent[sources[played <= max(faulty[0], played[0])].max() + 1 :] = False
+        if sources.size:
+            last = max(faulty[0], played[0]) if faulty.size else played[-1]
+            is_sent[sources[played <= last].max() + 1 :] = False
     sent = rows[is_sent]
     if not len(sent):
         raise _empty(run, "in this run no torques were sent")

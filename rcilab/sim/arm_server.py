@@ -547,7 +547,7 @@ class ArmServer:
                         self._server.receive(peer, frame)
                 case ClientConnected(peer):
                     self._server.connect(peer)  # First: it sends a state, for which the client may wait only briefly.
-                    self._log.write("connected", f"client {peer.address} connected", client=peer.address)
+                    self._log.write("connected", f"{self._name(peer)} connected", client=peer.address)
                     self._warn_of_other_target(peer.address)
                     if self._capture is not None:
                         self._capture.connect(peer.address)
@@ -582,16 +582,21 @@ class ArmServer:
         text = "{} connected, but states go to {}:{}, because of --client: ".format(address, *target) + consequence
         self._log.write("states_elsewhere", text, client=address, target="{}:{}".format(*target))
 
+    def _name(self, peer: Peer) -> str:
+        """Returns a client as the log names it: one of another channel than the main one with its protocol."""
+        is_main = peer.channel is self._server.channels[0]
+        return f"client {peer.address}" + ("" if is_main else f" ({peer.channel.protocol})")
+
     def _handle_disconnect(self, peer: Peer, reason: str) -> None:
         phase = self.controller.phase_name
         if self._server.disconnect(peer):
             if self._capture is not None:
                 self._capture.disconnect(reason)
-            text, kind = f"client {peer.address} {reason} during a motion: the arm stops", "client_lost"
+            text, kind = f"{self._name(peer)} {reason} during a motion: the arm stops", "client_lost"
         elif reason == CLOSED:
-            text, kind = f"client {peer.address} disconnected", "disconnected"
+            text, kind = f"{self._name(peer)} disconnected", "disconnected"
         else:
-            text, kind = f"client {peer.address} {reason}", "client_dropped"
+            text, kind = f"{self._name(peer)} {reason}", "client_dropped"
         self._log.write(kind, text, client=peer.address, reason=reason, phase=phase)
 
 

@@ -164,7 +164,9 @@ class JitterBuffer:
         return self._played_in_window / len(self._outcomes) if self._outcomes else 1.0
 
     def push(self, command: ArmCommand) -> bool:
-        """Queues a command from the network; returns False for a duplicate of one."""
+        """Queues a command from the network; returns False for a duplicate of one, or after the last one was played."""
+        if self.is_finished:  # A client repeats its last command until the state shows the end.
+            return False
         queue, newest = self._queue, self._newest
         if command == newest:
             self.duplicates += 1

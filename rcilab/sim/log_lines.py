@@ -44,6 +44,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "motion_ended": Kind("motions ended"),
         "guiding_started": Kind("hand guidings started"),
         "guiding_ended": Kind("hand guidings ended"),
+        "hand": Kind("actions of the hand"),
         "set_up": Kind("times the arm was set up"),
         "refused": Kind("requests were refused"),
         "fault": Kind("faults stopped the arm"),

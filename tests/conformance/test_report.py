@@ -32,6 +32,19 @@ def test_a_violation_reads_as_one_sentence_with_everything_in_it():
     )
 
 
+def test_a_smooth_motion_that_is_too_fast_is_to_be_slower_also_where_only_its_last_sample_is_beyond() -> None:
+    u = np.linspace(0.0, 1.0, 501)
+    q = np.tile(MODEL.home, (501, 1))
+    q[:, 3] += 0.7 * u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    velocity = np.diff(q[:, 3]) / 1e-3
+    first = int(np.flatnonzero(velocity > 2.175)[0]) + 1
+    found = check(Motion.from_cycles(q[: first + 1]), MODEL, distance=None).violations
+    violation = next(v for v in found if v.condition.id == "joint.velocity")
+    assert violation.count == 1
+    assert "slower" in str(violation)
+    assert "jump" not in str(violation)
+
+
 def test_an_angle_is_told_in_both_units():
     q = np.repeat(MODEL.home[np.newaxis], 10, axis=0)
     q[:, 1] = 2.2

@@ -340,6 +340,14 @@ def test_nothing_is_lost_after_the_last_command() -> None:
     assert take_ids(playout, 4) == [1, "wait", "wait", "wait"]
 
 
+def test_a_command_after_the_last_one_does_not_count() -> None:
+    playout = JitterBuffer(prefill=0)
+    playout.push(command(1, finished=True))
+    take_ids(playout, 1)
+    assert not playout.push(command(2, finished=True))
+    assert (playout.arrived, playout.late, playout.duplicates, len(playout)) == (1, 0, 0, 0)
+
+
 @pytest.mark.parametrize("lost", [1, 100, 400])
 def test_the_success_rate_forgets_what_is_older_than_its_window(lost: int) -> None:
     playout = JitterBuffer(prefill=0)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
+from rcilab.core.errors import InvalidValueError
+from rcilab.robots import RobotDescription
+
 CLIENT_PORT: Final = 1337
 """TCP port that every client connects to."""
 SINGLE_PRECISION: Final = 3e-7  # [rad] or [m] Half a unit in the last place of a float below 8 is at most 2.4e-7.
@@ -16,3 +19,18 @@ JOINT_STIFFNESS: Final = (3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0
 DEFAULT_CARTESIAN_STIFFNESS: Final = (2000.0, 2000.0, 2000.0, 100.0, 100.0, 100.0)  # [N/m], [N m/rad] The same.
 DEFAULT_THRESHOLD: Final = 20.0  # [N m], [N] Of every contact and collision after power-up; rcilab's own choice.
 LARGEST_THRESHOLD: Final = 1000.0  # [N m], [N] Of user interfaces; rcilab's own bound, the interface has none.
+
+
+def require_payload(mass: float, mounted: float, arm: RobotDescription) -> None:
+    """Raises an error if a load and the end effector, both in [kg], are heavier than the rated payload.
+
+    Raises:
+        InvalidValueError: They are too heavy.
+    """
+    most = arm.rated_payload
+    if mass + mounted <= most:
+        return
+    what = f"kg and {mounted:g} kg of the end effector are" if mounted else "kg is"
+    error = InvalidValueError("mass", float(f"{mass:.9g}"), f"{what} above {most:g} kg, the rated payload")
+    code = "load_heavy_mounted" if mounted else "load_heavy"
+    raise error.coded(code, mass=f"{mass:g}", mounted=f"{mounted:g}", most=f"{most:g}", model=arm.name)

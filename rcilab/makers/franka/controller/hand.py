@@ -14,6 +14,12 @@ from rcilab.makers.franka.wire.gripper import Grasp, HandStatus, Homing, MoveFin
 STROKE = 0.08  # [m]
 LARGEST_SPEED = 0.1  # [m/s] Of the distance of the fingers.
 LARGEST_FORCE = 140.0  # [N]
+_LARGEST_COMMANDED_SPEED = 2.0 * LARGEST_SPEED
+RANGES = (
+    f"it takes widths of 0 to {1e3 * STROKE:g} mm, speeds above 0 up to {1e3 * _LARGEST_COMMANDED_SPEED:g} mm/s and "
+    f"forces above 0 up to {LARGEST_FORCE:g} N"
+)
+"""What is commanded is within, as text."""
 TEMPERATURE = 30  # [degC]
 _HOMING_SPEED = 0.05  # [m/s]
 
@@ -103,4 +109,4 @@ class FrankaHand:
 
 
 def _is_within(width: float, speed: float) -> bool:
-    return 0.0 <= width <= STROKE and 0.0 < speed <= 2.0 * LARGEST_SPEED
+    return 0.0 <= width <= STROKE and 0.0 < speed <= _LARGEST_COMMANDED_SPEED

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from rcilab.core.errors import DecodeError
-from rcilab.makers.franka.controller.hand import TEMPERATURE, FrankaHand
+from rcilab.makers.franka.controller.hand import RANGES, TEMPERATURE, FrankaHand
 from rcilab.makers.franka.wire.gripper import (
     VERSION,
+    Grasp,
     HandConnect,
     HandFrameReader,
     HandRequest,
     HandStatus,
+    Homing,
+    MoveFingers,
     StopFingers,
     decode_hand_request,
     encode_hand_response,
@@ -18,6 +21,12 @@ from rcilab.makers.franka.wire.gripper import (
 from rcilab.sim.channels import ClientLink, Peer, TcpChannel
 
 HAND_PORT = 1338
+_OUTCOMES = {
+    HandStatus.SUCCESS: "done",
+    HandStatus.FAIL: "failed",
+    HandStatus.UNSUCCESSFUL: "no object of this width",
+    HandStatus.ABORTED: "aborted by the next command",
+}
 
 
 class HandServer:
@@ -75,7 +84,8 @@ class HandServer:
             return
         refusal = self.hand.begin(request)
         if refusal is not None:
-            self._link.log("refused", f"the hand refused {request}: out of its range", request=type(request).__name__)
+            text = f"the hand refused {_describe(request)}: {RANGES}"
+            self._link.log("refused", text, request=type(request).__name__, status=refusal.name)
             self._answer(request, command_id, refusal)
         else:
             self._pending = request, command_id
@@ -113,8 +123,24 @@ class HandServer:
         self._ended = None
         if self._pending is not None:
             (request, command_id), self._pending = self._pending, None
+            text = f"the hand: {_describe(request)} ended: {_OUTCOMES[status]}, {1e3 * self.hand.width:.1f} mm open"
+            width = round(self.hand.width, 4)
+            self._link.log("hand", text, request=type(request).__name__, status=status.name, width=width)
             self._answer(request, command_id, status)
 
     def _answer(self, request: HandRequest, command_id: int, status: HandStatus) -> None:
         if self._peer is not None:
             self._link.send_frame(self._peer, encode_hand_response(request, command_id, status))
+
+
+def _describe(request: HandRequest) -> str:
+    """Returns a command as the log names it."""
+    match request:
+        case MoveFingers(width=width, speed=speed):
+            return f"a move to {1e3 * width:g} mm at {1e3 * speed:g} mm/s"
+        case Grasp(width=width, speed=speed, force=force):
+            return f"a grasp of {1e3 * width:g} mm at {1e3 * speed:g} mm/s with {force:g} N"
+        case Homing():
+            return "a homing"
+        case _:
+            return "a stop"

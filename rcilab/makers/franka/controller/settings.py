@@ -21,6 +21,7 @@ from rcilab.makers.franka.bounds import (
     JOINT_STIFFNESS,
     LARGEST_JOINT_STIFFNESS,
     LONGEST_TOOL,
+    require_payload,
 )
 from rcilab.makers.franka.wire.requests import (
     Request,
@@ -185,12 +186,7 @@ def _with_frames(settings: Settings) -> Settings:
 
 
 def _with_bodies(settings: Settings, arm: RobotDescription) -> Settings:
-    mounted, mass = settings.end_effector.mass, settings.client_load.mass
-    if mounted + mass > arm.rated_payload:
-        what = f"kg and {mounted:g} kg of the end effector are" if mounted else "kg is"
-        raise InvalidValueError(
-            "mass", float(f"{mass:.9g}"), f"{what} above {arm.rated_payload:g} kg, the rated payload"
-        )
+    require_payload(settings.client_load.mass, settings.end_effector.mass, arm)
     return replace(settings, load=combine_payloads(settings.end_effector, settings.client_load))
 
 

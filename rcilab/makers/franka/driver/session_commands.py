@@ -12,6 +12,7 @@ from rcilab.core.errors import ModelError
 from rcilab.core.spatial import Pose
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ConfiguredArm, RequestLock
+from rcilab.makers.franka.bounds import require_payload
 from rcilab.makers.franka.driver.client import ANSWER_TIMEOUT, FciClient
 from rcilab.makers.franka.driver.configuration import send_configuration
 from rcilab.makers.franka.driver.settings import FciSettings, as_load
@@ -60,6 +61,7 @@ class FciSessionCommands(FciSettings):
         """
         with self._lock.acquire("setLoad"):
             load = as_load(mass, center_of_mass, inertia)
+            require_payload(load.mass, self.end_effector.mass, self._arm.model.description)
             model = self._arm.model.with_load(combine_payloads(self.end_effector, load))
             super().set_load(load.mass, load.center_of_mass, load.inertia)
             self._arm.model = model

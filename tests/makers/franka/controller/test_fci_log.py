@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from tests.peers.franka import programs, wire
+from rcilab.recording.client_motions import ClientMotions
+from rcilab.recording.client_report import report_on_client
+from rcilab.recording.run import build_run
+from tests.peers.franka import hand, programs, wire
 from tests.peers.franka.arena import FciArena, fci_arena
 from tests.peers.franka.robot import Output, Robot
 from tests.waiting import wait_for
@@ -85,3 +88,35 @@ def test_torques_are_named_so(version: int, text: str) -> None:
         robot.play(start, [Output(dq=programs.ZERO, tau=programs.ZERO)])
         assert place.log("motion_started") == [f"motion started: {text}"]
         assert facts(place, "motion_started") == {"mode": "torque"}
+
+
+def test_commands_that_repeat_the_last_torque_count_neither_in_log_nor_record() -> None:
+    with fci_arena(10, is_recorded=True) as place, place.connect() as robot:
+        ring = place.arena.server.ring
+        assert ring is not None
+        motions = ClientMotions(ring)
+        start = robot.move(wire.EXTERNAL, wire.NONE)
+        robot.play(start, programs.motion(start, wire.NONE, cycles=100), cycles=101)
+        robot.skip(20)
+        cycles = facts(place, "motion_ended")["cycles"]
+        part = motions.poll(is_last=True)[-1]
+        assert part.end is not None
+        assert part.end.received == cycles == 102
+        run = build_run(part.cycles, plan=None, model=part.motion.model, setup=part.motion.setup, realtime=False)
+        assert "the controller played them" not in report_on_client(run, part.end).text
+
+
+def test_a_client_of_the_hand_and_what_its_fingers_do_are_named() -> None:
+    with fci_arena(10) as place, place.connect_hand() as client:
+        assert client.ask(hand.MOVE, 0.05, 0.2) == "success"
+        assert client.ask(hand.MOVE, 0.09, 0.1) == "fail"
+        assert client.ask(hand.GRASP, 0.03, 0.005, 0.005, 0.2, 40.0) == "success"
+        client.state()
+        assert place.log() == [
+            "client 127.0.0.1 (hand) connected",
+            "the hand: a move to 50 mm at 200 mm/s ended: done, 50.0 mm open",
+            "the hand refused a move to 90 mm at 100 mm/s: it takes widths of 0 to 80 mm, speeds above 0 up to "
+            "200 mm/s and forces above 0 up to 140 N",
+            "the hand: a grasp of 30 mm at 200 mm/s with 40 N ended: done, 30.0 mm open",
+        ]
+        assert facts(place, "hand") == {"request": "Grasp", "status": "SUCCESS", "width": 0.03}

@@ -55,6 +55,8 @@ def test_the_load_is_that_of_the_state_and_of_the_model(robot):
     assert robot.state.tau == pytest.approx(expected, abs=0.01)
     with pytest.raises(InvalidValueError, match="mass"):
         robot.set_load(30.0, np.zeros(3))
+    with pytest.raises(InvalidValueError, match=r"mass: 30\.0 kg is above 3 kg, the rated payload"):
+        robot.set_load(30.0, np.zeros(3))
     robot.set_load(0.5, [0.0, 0.0, 0.05])
     assert not robot.fci.load.inertia.any()
     with pytest.raises(AttributeError, match=r"the requests of this robot's controller are in \.fci"):
