@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from rcilab.core.errors import InvalidValueError
-from rcilab.robots import RobotDescription
+from rcilab.robots.description import RobotDescription
 
 CLIENT_PORT: Final = 1337
 """TCP port that every client connects to."""
