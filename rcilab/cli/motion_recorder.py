@@ -144,6 +144,8 @@ def _require_writable(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
+    except FileExistsError as error:
+        raise InvalidValueError("record", os.fspath(folder), "is not a folder; choose another") from error
     except OSError as error:
         raise InvalidValueError(
             "record", os.fspath(folder), f"is not a folder that can be written to: {error.strerror}; choose another"

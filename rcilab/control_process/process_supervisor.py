@@ -153,7 +153,10 @@ class ProcessSupervisor:
             return None
         how = controller.exit_description
         self._end_controller()
-        return self._restart("crashed.controller", self._start_controller if was_ready else None, how=how)
+        maker = find_maker(self._model_name)
+        power = ", motor power off" if maker is None or maker.capabilities.switches_power else ""
+        start = self._start_controller if was_ready else None
+        return self._restart("crashed.controller", start, how=how, power=power)
 
     def _check_worker(self) -> ProcessExit | None:
         worker = self._worker

@@ -61,7 +61,7 @@ MESSAGES: dict[str, str] = {
     "lost.other_arm": "{error}",
     "lost.silent": "{address} has stopped sending states; reconnect tries again.",
     "crashed.controller": "The virtual controller has ended unexpectedly ({how}); {next}. The arm is then at its "
-    "initial pose, motor power off.",
+    "initial pose{power}.",
     "crashed.worker": "The control process has ended unexpectedly ({how}); {next}.",
     "crashed.frozen": "The control process has not responded for {seconds:.1f} s; {next}.",
 }

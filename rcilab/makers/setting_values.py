@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike
 from rcilab.core.arrays import Array, as_number, described
 from rcilab.core.errors import InvalidValueError
 
+_NO_NUMBERS = "bcSU"
+"""Kinds of numpy's types that it converts to numbers, but that are booleans, complex, or text."""
+
 
 def bounded_vector(
     name: str, values: ArrayLike, axes: Sequence[str], unit: str, least: ArrayLike | None = None,
@@ -30,10 +33,13 @@ def bounded_vector(
         InvalidValueError: It is not such a vector; the message names the first element that is wrong.
     """
     try:
+        if np.asarray(values).dtype.kind in _NO_NUMBERS:
+            raise TypeError
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         if len(axes) == 1:
             as_number(values[0], name, unit)  # type: ignore[index]  # A single number was put into a list.
+            raise InvalidValueError(name, values[0], f"must be a number [{unit}]") from error  # type: ignore[index]
         raise InvalidValueError(name, described(values), f"is not {len(axes)} numbers [{unit}]") from error
     if array.shape != (len(axes),):
         raise InvalidValueError(name, described(values), f"has shape {array.shape}, needs ({len(axes)},) [{unit}]")

@@ -86,7 +86,8 @@ class ClientRecorder:
                 self._finish(part.end, stopped=part.end.stopped)
         except RcilabError as error:
             file, self._file, self._failed = self._file, None, motion.number
-            rest = "is not recorded" if file is None else f"is recorded up to {_last_time(file.path):.3f} s only"
+            kept = file is not None and file.path.exists()
+            rest = f"is recorded up to {_last_time(file.path):.3f} s only" if file and kept else "is not recorded"
             self._show("not_recorded", f"motion {motion.number} {rest}: {error}")
 
     def _describe_gap(self, part: MotionPart) -> str:
@@ -131,13 +132,14 @@ class ClientRecorder:
 
     def _finish(self, end: MotionEnd | None = None, *, stopped: str | None = None) -> None:
         """Closes the file, if one is open, and has its report written."""
-        file, self._file = self._file, None
+        file = self._file
         if file is None or self._motion is None:
             return
         self._part += 1
         cut = ", without its beginning" if self._is_continued else ""
         name = f"motion {self._motion.number} of {self._motion.client}{cut}"
         file.close(stopped=stopped, truncated=self._is_continued)
+        self._file = None
         self._reports.submit(self._report, file.path, None if self._is_continued else end, name)
 
     def _report(self, path: Path, end: MotionEnd | None, name: str) -> None:

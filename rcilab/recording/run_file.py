@@ -83,6 +83,9 @@ _LARGEST_ROW = 4096  # [bytes] Tuning value: a cycle with the complete state tak
 class RunWriter:
     """Writes a run while the arm moves; the data written so far stay readable after a crash. Owned by one thread.
 
+    Attributes:
+        written: Number of cycles that the stream has passed on.
+
     Args:
         stream: Binary stream; the caller closes it.
         dtype: Layout of one cycle.
@@ -109,6 +112,7 @@ class RunWriter:
         self._stream = stream
         self._dtype = dtype
         self._pending: NDArray[np.void] = np.zeros(0, dtype)
+        self.written = 0
         head = {
             "arm": None if model is None else _arm_facts(model),
             "fields": [[name, field[0].base.str, list(field[0].shape)] for name, field in _fields(dtype)],
@@ -129,7 +133,8 @@ class RunWriter:
         while len(self._pending) >= CHUNK_CYCLES:
             self._write(self._pending[:CHUNK_CYCLES])
             self._pending = self._pending[CHUNK_CYCLES:]
-        self._stream.flush()
+            self._stream.flush()
+            self.written += CHUNK_CYCLES
 
     def finish(
         self,
@@ -182,7 +187,7 @@ class RunFile:
 
     Raises:
         FileExistsError: It exists, and `is_new`.
-        InvalidValueError: The file cannot be written. The methods raise it too and keep the data written so far.
+        InvalidValueError: The file cannot be written. The methods raise it too, and keep a file with cycles only.
     """
 
     def __init__(self, path: Path, dtype: np.dtype[np.void], *, is_new: bool = False, **facts: Any) -> None:
@@ -202,7 +207,8 @@ class RunFile:
         try:
             self._writer = RunWriter(self._stream, dtype, **facts)
         except OSError as error:
-            raise self._abandon(error) from error
+            self.discard()
+            raise _unwritable(path, error) from error
 
     def add(self, cycles: NDArray[np.void]) -> None:
         """Adds cycles."""
@@ -218,21 +224,22 @@ class RunFile:
                 self._writer.finish(stopped=stopped, truncated=truncated, plan=plan)
                 os.fsync(self._stream.fileno())
         except OSError as error:
-            raise _unwritable(self.path, error) from error
+            raise self._abandon(error) from error
 
     def _abandon(self, error: OSError) -> InvalidValueError:
-        """Closes the file, deletes it if it is empty, and returns the error to raise."""
-        with suppress(OSError):
-            self._stream.close()  # Flushes once more, and closes in any case.
-        with suppress(OSError):
-            if self.path.stat().st_size == 0:
-                self.path.unlink()
+        """Closes the file, deletes it if no cycle is complete in it, and returns the error to raise."""
+        if self._writer.written:
+            with suppress(OSError):
+                self._stream.close()  # Flushes once more, and closes in any case.
+        else:
+            self.discard()
         return _unwritable(self.path, error)
 
     def discard(self) -> None:
         """Closes and deletes the file."""
         with suppress(OSError):
             self._stream.close()
+        with suppress(OSError):
             self.path.unlink()
 
 

@@ -16,6 +16,7 @@ from rcilab.sim.log_entry import LogEntry, LogFormat
 
 _MAX_QUEUED = 200  # [entries] A tuning value.
 _PERIOD = 10.0  # [s] For which entries of a kind that any peer can cause are counted together. A tuning value.
+_FOREIGN = 5  # [entries] Per period, of a kind that any machine in the network can cause. A tuning value.
 _CLOSE_TIMEOUT = 0.5  # [s] For the last entries at the end of the controller, if they are not read.
 
 
@@ -33,11 +34,11 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "connected": Kind("clients connected"),
         "disconnected": Kind("clients disconnected"),
         "client_lost": Kind("clients were lost during a motion"),
-        "client_dropped": Kind("clients were dropped", 1),
-        "client_refused": Kind("clients were refused", 1),
+        "client_dropped": Kind("clients were dropped", _FOREIGN),
+        "client_refused": Kind("clients were refused", _FOREIGN),
         "states_elsewhere": Kind("connected", 1),
-        "unknown_sender": Kind("were ignored", 1),
-        "bad_datagram": Kind("datagrams of another size were ignored", 1),
+        "unknown_sender": Kind("were ignored", _FOREIGN),
+        "bad_datagram": Kind("datagrams of another size were ignored", _FOREIGN),
         "power_on": Kind("times the motors were switched on"),
         "power_off": Kind("times the motors were switched off"),
         "motion_started": Kind("motions started"),

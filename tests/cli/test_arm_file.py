@@ -194,7 +194,7 @@ def test_what_is_wrong_in_a_file_is_one_sentence_with_file_and_key(tmp_path: Pat
             ('record = "runs"', 'record = "/dev/null"'),
             "my_arm.toml: [controller] record: '/dev/null' is not",
         ),
-        (["--record", "/dev/null"], ("", ""), "--record: '/dev/null' is not a folder that can be written to"),
+        (["--record", "/dev/null"], ("", ""), "--record: '/dev/null' is not a folder; choose another"),
         (["--record", ""], ("", ""), "--record needs the name of a folder, such as recordings, got ''"),
         ([], ('record = "runs"', 'record = ""'), "my_arm.toml: [controller] record needs the name of a folder"),
         ([], ("10,30,0", "30,0"), "my_arm.toml: [arm] start: "),
@@ -218,6 +218,11 @@ def test_a_value_that_cannot_be_names_its_option_or_its_key(
     shown = capsys.readouterr().err
     assert expected in shown
     assert shown.count("\n") == 1
+
+
+def test_a_load_that_a_franka_arm_does_not_bear_names_its_option(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["controller", "--model", "FR3", "--port", "0", "--load", "9"]) == 2
+    assert capsys.readouterr().err == "rcilab: --load: mass: 9.0 kg is above 3 kg, the rated payload\n"
 
 
 @pytest.mark.parametrize("model", ["FR3", "RM65"])

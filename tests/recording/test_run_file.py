@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import resource
 import struct
 import zlib
 from dataclasses import replace
@@ -198,6 +199,28 @@ def test_other_files_are_refused_in_words(tmp_path):
         some_run().save(tmp_path / "a.xls")
     with pytest.raises(InvalidValueError, match="cannot be written"):
         some_run().save(tmp_path / "no" / "folder.rcirun")
+
+
+@pytest.mark.parametrize(("size", "kept"), [(1_000, 0), (100_000, CHUNK_CYCLES)])
+def test_on_a_full_disk_a_file_is_kept_for_its_complete_cycles_only(tmp_path, size, kept):
+    path, limits = tmp_path / "a.rcirun", resource.getrlimit(resource.RLIMIT_FSIZE)
+    cycles = some_cycles()[:CHUNK_CYCLES].copy()
+
+    def fill() -> None:
+        file = RunFile(path, cycles.dtype, plan=None, model=MODEL)
+        while True:
+            file.add(cycles)
+            cycles["t"] += 1.0
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))  # Writing fails beyond it, as on a full disk.
+    try:
+        with pytest.raises(InvalidValueError, match="cannot be written"):
+            fill()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert path.exists() == bool(kept)
+    if kept:
+        assert len(load_run(path).t) >= kept
 
 
 def test_a_missing_library_is_named_with_its_extra(monkeypatch):

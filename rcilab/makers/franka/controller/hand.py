@@ -64,8 +64,8 @@ class FrankaHand:
                 self._task = _Task(request=request, widths=(0.0, STROKE), speed=_HOMING_SPEED)
             case MoveFingers(width=width, speed=speed) if _is_within(width, speed):
                 self._task = _Task(request=request, widths=(width,), speed=speed)
-            case Grasp(width=width, speed=speed, force=force) if (
-                _is_within(width, speed) and 0.0 < force <= LARGEST_FORCE
+            case Grasp(width=width, epsilon_inner=inner, epsilon_outer=outer, speed=speed, force=force) if (
+                _is_within(width, speed) and inner >= 0.0 and outer >= 0.0 and 0.0 < force <= LARGEST_FORCE
             ):
                 self._task = _Task(request=request, widths=(0.0,), speed=speed)
             case _:

@@ -114,6 +114,9 @@ class HandServer:
         if is_known and not self._link.direct_datagrams(peer, request.udp_port):
             self._link.drop(peer, f"asked for states at port {request.udp_port}, which is not valid")
             return
+        if not is_known:
+            text = f"refused a client of the hand of version {request.version}: this hand has version {VERSION}"
+            self._link.log("refused", text, request="Connect")
         self._is_connected = is_known
         status = HandStatus.SUCCESS if is_known else HandStatus.FAIL
         self._link.send_frame(peer, encode_hand_response(request, command_id, status))

@@ -117,6 +117,9 @@ def apply_setup(settings: Settings, setup: ArmSetup, arm: RobotDescription) -> S
     if setup.T_flange_tool is not None:
         settings = _with_frames(replace(settings, F_T_NE=setup.T_flange_tool, NE_T_EE=IDENTITY))
     if setup.load is not None:
+        if setup.load.mass > arm.rated_payload:
+            requirement = f"kg is above {arm.rated_payload:g} kg, the rated payload"
+            raise InvalidValueError("load: mass", setup.load.mass, requirement)
         settings = _with_bodies(replace(settings, end_effector=setup.load), arm)
     return settings
 

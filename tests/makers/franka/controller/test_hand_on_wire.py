@@ -40,6 +40,7 @@ def test_another_version_is_refused(place: FciArena) -> None:
         assert (hand.status, hand.server_version) == (1, 3)
         with pytest.raises(ConnectionResetError):
             hand.ask(wire.HOMING)
+    assert "refused a client of the hand of version 2: this hand has version 3" in place.log("refused")
     with place.connect_hand() as good:
         assert good.status == 0
 
@@ -98,6 +99,14 @@ def test_a_command_is_aborted_by_the_next_one(hand: Hand) -> None:
 def test_a_width_or_speed_out_of_range_fails_and_moves_nothing(hand: Hand, values: tuple[float, float]) -> None:
     before = hand.state()
     assert hand.ask(wire.MOVE, *values) == "fail"
+    assert hand.state().width == before.width
+
+
+@pytest.mark.parametrize("epsilon", [math.nan, -0.005])
+def test_a_grasp_with_an_impossible_tolerance_fails_and_moves_nothing(hand: Hand, epsilon: float) -> None:
+    before = hand.state()
+    for tolerances in ((epsilon, 0.005), (0.005, epsilon)):
+        assert hand.ask(wire.GRASP, 0.06, *tolerances, 0.2, 40.0) == "fail"
     assert hand.state().width == before.width
 
 

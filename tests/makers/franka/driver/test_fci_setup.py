@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import signal
+
 import numpy as np
 import pytest
 
@@ -23,7 +26,7 @@ from rcilab.makers.parameters import default_parameters
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from tests.makers.franka.driver.conftest import ARMS, NO_LIBRARY
-from tests.waiting import SOON
+from tests.waiting import SOON, wait_for
 
 LOAD = Payload(mass=1.0, center_of_mass=np.array([0.0, 0.0, 0.05]))
 TOOL = Pose(position=[0.01, 0.0, 0.12], wxyz=[0.92387953, 0.0, 0.0, -0.38268343])
@@ -78,6 +81,14 @@ def test_a_page_shows_the_load_that_the_controller_reports():
         assert supervisor.status().load.center_of_mass == pytest.approx([0.0, 0.0, 0.05])
 
 
+@NO_LIBRARY
+def test_a_controller_that_ends_is_named_without_motor_power():
+    with Supervisor(load_model("FR3")) as supervisor:
+        os.kill(supervisor.status().controller_pid, signal.SIGKILL)
+        incident = wait_for(lambda: supervisor.status().incident)
+    assert incident.message.endswith("The arm is then at its initial pose.")
+
+
 def test_parameters_are_taken_and_bounds_named(robot):
     defaults = default_parameters(parameters_of(robot.model))
     soft = ControllerParameters(
@@ -93,6 +104,12 @@ def test_parameters_are_taken_and_bounds_named(robot):
         robot.fci.set_cartesian_impedance([5.0, 500.0, 500.0, 20.0, 20.0, 20.0])
     with pytest.raises(InvalidValueError, match=r"upper_torques, joint 1 must not be below 20 \[N m\], got 10.0"):
         robot.fci.set_collision_behavior([20.0] * 7, [10.0] * 7, [20.0] * 6, [20.0] * 6)
+    for wrong in (["1"] * 7, [True] * 7):
+        with pytest.raises(InvalidValueError, match=r"stiffness: \[.*\] is not 7 numbers \[N m/rad\]"):
+            robot.fci.set_joint_impedance(wrong)
+    for wrong in ("2", True):
+        with pytest.raises(InvalidValueError, match=r"mass must be a number \[kg\], got"):
+            robot.fci.set_load(wrong, np.zeros(3))
     with pytest.raises(InvalidValueError, match="known: joint_stiffness"):
         robot.configure(RobotConfiguration(control=ControllerParameters(filters=(100.0,))))
 

@@ -207,14 +207,14 @@ def test_what_anybody_can_cause_is_written_once_in_a_while_and_summed_up():
     for number in range(1000):
         log.write("client_dropped", f"the client left {number}")
     log.write("refused", "another kind")
-    assert [entry.text for entry in entries] == ["the client left 0", "another kind"]
+    assert [entry.text for entry in entries] == [*(f"the client left {number}" for number in range(5)), "another kind"]
     now += 60.0
     log.write_counts()
-    assert [entry.text for entry in entries[2:]] == ["999 more clients were dropped within 10 s"]
-    assert entries[2].facts == {"count": 999}
+    assert [entry.text for entry in entries[6:]] == ["995 more clients were dropped within 10 s"]
+    assert entries[6].facts == {"count": 995}
     for number in range(30):
         log.write("refused", f"refused {number}")
-    assert [entry.text for entry in entries[3:]] == [f"refused {number}" for number in range(20)]
+    assert [entry.text for entry in entries[7:]] == [f"refused {number}" for number in range(20)]
 
 
 def test_a_client_that_is_refused_again_and_again_fills_no_log(monkeypatch):
@@ -236,7 +236,7 @@ def test_connections_that_speak_no_rci_are_summed_up(sent):
                     while link.recv(4096):
                         pass
         found.wait_for_line("not valid RCI")
-    assert len(found.lines) == 1
+    assert len(found.lines) == 5
 
 
 def test_lines_that_are_not_read_are_dropped_and_counted_and_do_not_block():
