@@ -50,3 +50,9 @@ def start_of_plans(model: RobotModel, status: ArmStatus) -> JointVector | None:
     The plans of an arm for which motions are only planned begin at its home pose.
     """
     return model.home if is_only_planned(model) else status.q_c
+
+
+def has_zero_pose(model: RobotModel) -> bool:
+    """Returns whether all joints can be at 0."""
+    joint = model.limits.joint
+    return bool(((joint.lower < 0.0) & (joint.upper > 0.0)).all())

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from rcilab.app.planning import Plan, build_plan_view
 from rcilab.conformance.check import check
-from rcilab.core.clock import CYCLE_TIME
 from rcilab.motion import Motion
 from rcilab.recording.run import Run
 
@@ -37,7 +36,7 @@ def display_fault(demo: FaultDemo) -> DisplayedMotion:
     """Returns a provoked fault as scene, timeline and curves draw it."""
 
     def draw(motion: Motion) -> Plan:
-        reported = round(demo.moment / CYCLE_TIME)
+        reported = demo.cycle
         checked = Motion.from_cycles(motion.q[: reported + 1])  # The rest is the controller's stop.
         return build_plan_view(demo.model, motion, check(checked, demo.model, distance=None))
 
@@ -46,7 +45,7 @@ def display_fault(demo: FaultDemo) -> DisplayedMotion:
         plan=draw(commanded),
         scene=draw(demo.moved),
         run=Run(plan=commanded, cycles=demo.whole, model=demo.model),
-        moment=demo.moment,
+        moment=demo.time,
     )
 
 

@@ -264,7 +264,7 @@ class _MotionChecker:
             bound=bound,
             ratio=float(reach[column]),
             joint=_axis(condition, column),
-            time=first_time + row * CYCLE_TIME,
+            time=self._time(condition, first_time, row),
             broken=0 if is_violated is None else int(np.count_nonzero(is_violated)),
             links=self._signals.links(condition, row),
             start_excess=self._signals.start_excess if condition.signal == "position" else 0.0,
@@ -354,15 +354,20 @@ class _MotionChecker:
         return Violation(
             condition=condition,
             joint=joint,
-            time=first_time + begin * CYCLE_TIME,
+            time=self._time(condition, first_time, begin),
             count=end - begin,
             value=value,
-            worst_time=first_time + row * CYCLE_TIME,
+            worst_time=self._time(condition, first_time, row),
             bound=bound,
             ratio=worst,
             advice=advice,
             links=self._signals.links(condition, row),
         )
+
+    def _time(self, condition: Condition, first_time: float, row: int) -> float:
+        """Returns the time of a row, [s]; in those after the end the arm is still where the motion ends."""
+        time = first_time + row * CYCLE_TIME
+        return time if condition.order else min(time, self._motion.duration)
 
 
 def _limits_of(motion: Motion, limits: Limits, start: StartState) -> Limits:

@@ -103,6 +103,12 @@ def find_slow_down(
     return _Search(report, _max_factor(report.motion, at_most), progress or (lambda part: None)).run(recommended)
 
 
+def can_slow_down_help(report: Report) -> bool:
+    """Returns whether a violated condition depends on the speed, and no necessary one does not."""
+    powers = [(row.necessity, _power(row.condition)) for row in _broken(report)]
+    return ("necessary", 0) not in powers and any(power > 0 for _, power in powers)
+
+
 class _Search:
     """One search, with the original report and the largest factor."""
 

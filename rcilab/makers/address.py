@@ -47,7 +47,7 @@ def split_address(text: str, scheme: str, example: str, known: tuple[str, ...]) 
     if parts.scheme != scheme:
         raise InvalidValueError("address", text, f"begins with {parts.scheme}://, needs {scheme}://, like {example}")
     if not parts.hostname or parts.username or parts.path not in ("", "/"):
-        raise InvalidValueError("address", text, f"must be a host and a port, like {example}")
+        raise InvalidValueError("address", text, f"needs a host, like {example}")
     _require_host(text, parts.hostname, example)
     try:
         port = parts.port

@@ -9,6 +9,7 @@ import ipywidgets
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rcilab.app.arm_features import has_zero_pose
 from rcilab.app.goal.goal_actions import MoveJoint, PoseGoal, PoseName
 from rcilab.core.arrays import JointVector
 from rcilab.i18n.rounding import format_fixed
@@ -67,7 +68,7 @@ class JogPanel(Part):
         for slider, field in zip(self.sliders, self.fields, strict=True):
             slider.observe(self._on_slider, names="value")
             rows += [_row(slider, field), field.message_box]
-        buttons = [self._button(name) for name in _BUTTONS]
+        buttons = [self._button(name) for name in _BUTTONS if name != "zero" or has_zero_pose(self.model)]
         self._pose, self._reach = block(), block()
         self.build([*rows, shared_style_widget(ipywidgets.HBox, buttons), self._pose, self._reach], min_width="360px")
         self.subscribe("goal", self._show)

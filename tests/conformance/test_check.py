@@ -82,6 +82,16 @@ def test_a_motion_that_ends_moving_is_flagged_in_the_cycle_after_its_last_row():
     assert "end.velocity" in {v.condition.id for v in report.warnings}
 
 
+def test_a_position_that_is_worst_at_the_end_has_a_time_within_the_motion():
+    arm = load_model("FR3")
+    motion = plan_joint(arm, arm.home, arm.home + np.radians([0.0, 109.0, 0.0, 0.0, 0.0, 60.0, 0.0]))
+    report = check(motion, arm)
+    floor = next(row for row in report.rows if row.id == "clearance.floor")
+    assert not floor.ok
+    assert all(row.time <= motion.duration for row in report.rows if row.condition.order == 0)
+    assert all(v.worst_time <= motion.duration for v in report.violations if v.condition.order == 0)
+
+
 def test_a_motion_that_starts_elsewhere_is_flagged_in_its_first_cycle():
     start = MODEL.home.copy()
     start[2] += 1e-3

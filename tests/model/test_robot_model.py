@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rcilab
-from rcilab.core.errors import InvalidValueError, ModelError
+from rcilab.core.errors import InvalidValueError, ModelError, UnreachableError
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel, load_model, require_model
 from rcilab.robots import ROBOT_NAMES
@@ -166,3 +166,13 @@ def test_values_of_a_model_show_themselves_in_one_short_line():
 def test_who_knows_the_manuals_model_library_finds_its_names(manual, names):
     for name in names:
         assert f"({manual}" in getattr(RobotModel, name).__doc__ or f", {manual})" in getattr(RobotModel, name).__doc__
+
+
+@pytest.mark.parametrize("name", ["FR3", "xMatePro7", "xArm5"])
+def test_a_position_in_mm_is_answered_with_the_unit(name):
+    model = load_model(name)
+    with pytest.raises(UnreachableError, match="positions are in m"):
+        model.inverse(Pose((400.0, 0.0, 300.0), model.forward(model.home).wxyz))
+    with pytest.raises(UnreachableError) as caught:
+        model.inverse(Pose((2.0, 0.0, 0.3), model.forward(model.home).wxyz))
+    assert "positions are in m" not in str(caught.value)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rcilab.app.check.check_actions import CheckActions, PressCheck, plot_of
-from rcilab.app.check.report_rows import row_tone
+from rcilab.app.check.report_rows import row_tone, row_word
 from rcilab.app.check.slowdown_job import scaled, slow_to_goal
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import GoalActions
@@ -23,6 +23,7 @@ from rcilab.app.program.program_draft import Draft, number_at
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import Text
 from rcilab.app.view_actions import PLOTS
+from rcilab.conformance.time_scaling import can_slow_down_help
 from rcilab.control_process import SupervisorStatus
 from rcilab.control_process.status import Phase
 from rcilab.core.safety_box import SafetyBox
@@ -134,8 +135,11 @@ def test_a_way_into_the_floor_is_mended_by_no_slow_down() -> None:
     bench.goal.set_joints(HOME + np.array([0.0, 1.4, 0.0, 0.9, 0.0, 0.0, 0.0]))
     bench.store.update(plan=bench.plan.completed())
     assert not bench.plan.report.ok
+    assert not can_slow_down_help(bench.plan.report)
     bench.press("slow")
     bench.settle()
+    advised = next(row for row in bench.plan.report.rows if row.id == "clearance.floor.advised")
+    assert row_word(advised, Text("en")) == "below recommended"
     answer, found = bench.state.check.answer, bench.state.check.found
     assert answer is not None
     assert found is not None
@@ -149,6 +153,8 @@ def test_where_a_lower_speed_does_it_the_plan_is_made_anew_with_that(bench: Benc
     assert not slower.is_stretched
     assert slower.plan.motion.speed == pytest.approx(slower.scale)
     assert broken(slower.plan) == set()
+    assert can_slow_down_help(bench.plan.report)
+    assert not can_slow_down_help(slower.plan.report)
 
 
 def planned_program(bench: Bench) -> Draft:

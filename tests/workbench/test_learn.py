@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -118,6 +119,18 @@ def test_the_controlled_stop_after_the_fault_is_shown_too_and_its_moment_marked(
     frame = build_frame(plan_curves(show.displayed.plan.motion, "q"), None, MODEL.limits.joint, "q", 0)
     marked = mark_moment(frame, demo.time)
     assert np.abs(marked.t[marked.violated & ~frame.violated] - demo.time).min() < 0.02
+
+
+def test_dropped_states_leave_one_clock_for_timeline_and_report(bench: Bench) -> None:
+    bench.provoke(Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY)
+    show = bench.state.learn.show
+    assert show is not None
+    kept = np.delete(np.arange(len(show.demo.cycles)), [5, 6, 7])
+    demo = replace(show.demo, cycles=show.demo.cycles[kept])
+    assert demo.sample == demo.cycle - 3
+    assert demo.commanded.duration == demo.moved.duration == pytest.approx(show.demo.commanded.duration)
+    np.testing.assert_allclose(demo.commanded.q[demo.cycle], show.demo.commanded.q[show.demo.sample])
+    assert f"t = {demo.time:.3f} s, cycle {demo.cycle}" in head_html(demo, Text("en"))
 
 
 def test_who_cancels_sees_nothing(bench: Bench) -> None:

@@ -35,7 +35,7 @@ def row_word(row: ConditionResult, text: Text) -> str:
     if tone == "bad":
         return text("check.violated")
     if not row.ok:
-        return text("check.exceeded")
+        return text("check.below" if row.condition.is_clearance else "check.exceeded")
     return text("check.kept" if tone == "good" or row.start_excess else "check.tight")
 
 

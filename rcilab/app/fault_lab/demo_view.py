@@ -32,7 +32,7 @@ def head_html(demo: FaultDemo, text: Text) -> str:
     unit = unit_name(row.unit, text)
     facts = text(
         "learn.number", value=value, bound=with_unit(bound, row.unit, text),
-        time=f"{demo.time:.3f}", sample=demo.sample,
+        time=f"{demo.time:.3f}", sample=demo.cycle,
     )  # fmt: skip
     sent = demo.describe("sent", text.language, text.units)
     place = text("check.joint", joint=demo.signal.axis) + " · " if demo.signal.axis else ""

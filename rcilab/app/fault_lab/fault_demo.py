@@ -59,18 +59,13 @@ class FaultDemo:
 
     @property
     def time(self) -> float:
-        """Time of the report, from the first command, [s]."""
+        """Time of the report, from the first command, [s]; also on the clock of `commanded` and `moved`."""
         return float(self.cycles["t"][-1])
 
     @property
-    def moment(self) -> float:
-        """The same time on the clock of `commanded` and `moved`, which omit dropped rows, [s]."""
-        return self.sample * self._period * CYCLE_TIME
-
-    @property
-    def _period(self) -> int:
-        """Cycles from one row to the next."""
-        return state_cycles(self.cycles)
+    def cycle(self) -> int:
+        """Cycle of the report, counted from the first command; above `sample` if states were dropped."""
+        return round(self.time / CYCLE_TIME)
 
     @property
     def whole(self) -> NDArray[np.void]:
@@ -114,28 +109,26 @@ class FaultDemo:
         After the fault they are the controller's stop. Torque commands have no joint angles: the motion stays at its
         start.
         """
-        q, sent = self._every_cycle("q_c"), self.cycles["command"][:-1]
+        q, sent = np.array(self.whole["q_c"]), self.cycles["command"][:-1]
         if self.scenario.mode == "torque":
             q[:] = q[0]
         elif np.isfinite(sent).all():
             q[1 : len(self.cycles)] = sent
-        return Motion.from_cycles(q, self._period)
+        return self._as_motion(q)
 
     @property
     def moved(self) -> Motion:
         """The motion to draw: commanded, if a position command was wrong, otherwise measured."""
         if self.scenario.is_commanded:
             return self.commanded
-        return Motion.from_cycles(self._every_cycle("q"), self._period)
+        return self._as_motion(self.whole["q"])
 
-    def _every_cycle(self, name: str) -> Array:
-        """Returns joint angles of every cycle, shape (N, n), [rad]; dropped states are interpolated."""
-        stop = np.concatenate((self.cycles[-1:], self.after))
-        known: Array = np.array(stop["message_id"], np.float64)
-        wanted: Array = np.arange(float(known[0]) + self._period, float(known[-1]) + 1.0, self._period)
-        angles: Array = np.array(stop[name], np.float64)
-        after: list[Array] = [np.interp(wanted, known, angles[:, joint]) for joint in range(angles.shape[1])]
-        return np.concatenate((self.cycles[name], np.stack(after, axis=1)))
+    def _as_motion(self, q: Array) -> Motion:
+        """Returns the joint angles of all rows, shape (N, n), [rad], as a motion; dropped states are interpolated."""
+        period, known = state_cycles(self.cycles), self.whole["message_id"].astype(np.float64)
+        wanted = np.arange(known[0], known[-1] + 1.0, period)
+        every = [np.interp(wanted, known, q[:, joint]) for joint in range(q.shape[1])]
+        return Motion.from_cycles(np.stack(every, axis=1), period)
 
     def describe(
         self, what: Literal["sent", "explanation", "prevention"], language: Language = "en", units: Units = USUAL

@@ -31,7 +31,7 @@ class FaultDisplay:
     @property
     def playhead(self) -> float:
         """Place of the fault on the timeline, 0 to 1; the controlled stop follows it."""
-        return self.demo.moment / max(self.displayed.plan.motion.duration, CYCLE_TIME)
+        return self.demo.time / max(self.displayed.plan.motion.duration, CYCLE_TIME)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

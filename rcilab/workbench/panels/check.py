@@ -11,6 +11,7 @@ from rcilab.app.check.report_rows import count_unheeded
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import is_plan_current
 from rcilab.app.text import Text
+from rcilab.conformance.time_scaling import can_slow_down_help
 from rcilab.i18n.translator import Message, with_space
 from rcilab.workbench.panels.check_rows import rows_html
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
@@ -68,8 +69,8 @@ class CheckPanel:
         self._undo.disabled = check.slowed is None or busy
         changed = outdated(state)
         self._again.visible = changed is not None and not busy
-        is_met = plan is not None and plan.report.ok and not plan.report.warnings  # A slow-down has no purpose.
-        is_fixed = plan is None or plan.is_recorded or is_met  # What a client commanded is not changed here.
+        # What a client commanded is not changed here.
+        is_fixed = plan is None or plan.is_recorded or not can_slow_down_help(plan.report)
         self._slow.disabled = is_fixed or busy or changed is not None or is_moving(status)
         self._explain.disabled = plan is None or busy
         if self._tools.visible is (plan is None):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
+from rcilab.app.arm_features import has_zero_pose
 from rcilab.app.goal.goal_actions import PoseGoal
 from rcilab.app.goal.named_pose_actions import NamedPose
 from rcilab.app.text import Text
@@ -30,8 +31,9 @@ class PosesPanel:
         text, ask = self._text, self._ask
         with gui.add_folder(text("jog.poses")):
             gui.add_html('<i class="rl-poses"></i>')
-            named = gui.add_button_group(" ", [text(f"jog.{name}") for name in _NAMES])
-            names: dict[str, _Name] = {text(f"jog.{name}"): name for name in _NAMES}
+            shown = [name for name in _NAMES if name != "zero" or has_zero_pose(state.model)]
+            names: dict[str, _Name] = {text(f"jog.{name}"): name for name in shown}
+            named = gui.add_button_group(" ", list(names))
 
             @named.on_click
             async def _(event: Any) -> None:

@@ -16,6 +16,14 @@ Angles: TypeAlias = tuple[float, ...]
 REACH_TOLERANCE = 1e-9  # [m] A pose out of reach by less, because of rounding, counts as at the limit of reach.
 
 
+_FAR = 10.0  # [m] A target farther away is probably one in mm.
+
+
+def unit_hint(distance: float) -> str:
+    """Returns what to add to the error of a pose that is out of reach by a distance, [m]."""
+    return "; positions are in m" if distance > _FAR else ""
+
+
 @dataclass(frozen=True, slots=True)
 class Redundancy:
     """The redundancy of an arm at a pose of the flange; it defines the redundancy angle `psi`."""

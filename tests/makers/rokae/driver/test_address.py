@@ -26,10 +26,10 @@ def test_options_name_the_ports_that_differ():
     [
         ("", "write it like rci://"),
         ("http://127.0.0.2", "needs rci://"),
-        ("rci://:1337", "a host and a port"),
+        ("rci://:1337", "needs a host"),
         ("rci://host:99999", "port"),
         ("rci://host:0", "port"),
-        ("rci://host/robot", "a host and a port"),
+        ("rci://host/robot", "needs a host"),
         ("rci://host?udp_prt=1", "known: udp_port, client_port"),
         ("rci://host?udp_port=x", "udp_port 'x'"),
         ("rci://[::1]:1337", "IPv6, which is not supported; write the robot's IPv4 address"),

@@ -22,7 +22,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.errors import ModelError, UnreachableError
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.forward import Chain, build_chain
-from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE
+from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE, unit_hint
 from rcilab.robots.description import DhRow, RobotDescription
 
 ELBOW = 2
@@ -282,6 +282,6 @@ def _unreachable(arm: OffsetGeometry, beyond: Array) -> UnreachableError:
         )
     return UnreachableError(
         f"out of reach by {1e3 * excess:.1f} mm: the wrist has to be {shortest:.3f} to {longest:.3f} m from the "
-        "shoulder, at any angle of joint 7; move the target",
+        f"shoulder, at any angle of joint 7; move the target{unit_hint(excess)}",
         distance=excess,
     )

@@ -19,7 +19,7 @@ from math import atan2, cos, hypot, pi, sin, sqrt, tau
 from rcilab.core.errors import ModelError, SingularError, UnreachableError
 from rcilab.core.spatial import Pose, Rotation9
 from rcilab.model.kinematics.arm_angle import reference_frame
-from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE, Angles
+from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE, Angles, unit_hint
 from rcilab.robots.description import DhRow, RobotDescription
 
 _AXIS_LOST = 1e-12  # sin of an angle below which the axes before and after it are parallel within rounding.
@@ -206,7 +206,7 @@ def reach_error(arm: ArmGeometry, length: float) -> UnreachableError:
     if length > longest:
         return UnreachableError(
             f"out of reach by {1e3 * (length - longest):.1f} mm: the wrist centre would be {length:.3f} m from the "
-            f"shoulder, the arm reaches {longest:.3f} m; move the target closer",
+            f"shoulder, the arm reaches {longest:.3f} m; move the target closer{unit_hint(length)}",
             distance=length - longest,
         ).coded("too_far", distance=length - longest)
     return UnreachableError(
