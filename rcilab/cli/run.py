@@ -56,7 +56,9 @@ def add_parser(subparsers: Any) -> None:
         "to its end; 1 it does not conform, was not confirmed, or was stopped; 2 bad input, no robot or a fault.",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=HELP)
-    parser.add_argument("--robot", required=True, metavar="ADDRESS", help="rci://HOST:PORT, fci://HOST, xarm://HOST")
+    parser.add_argument(
+        "--robot", required=True, metavar="ADDRESS", help="rci://HOST:PORT, fci://HOST, xarm://HOST, realman://HOST"
+    )
     parser.add_argument(
         "--model", metavar="NAME", help="arm, such as xMatePro7, or its file my_arm.json; default: that of the robot"
     )

@@ -39,7 +39,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--robot",
         default="virtual",
         metavar="ADDRESS",
-        help="controller to connect to: rci://HOST:PORT, fci://HOST, xarm://HOST",
+        help="controller to connect to: rci://HOST:PORT, fci://HOST, xarm://HOST, realman://HOST",
     )
     add_page_options(parser)
 

@@ -41,7 +41,7 @@ def connect(
     Args:
         address: `rci://HOST:PORT`; `?udp_port=N` if the robot receives commands at another UDP port,
             `?client_port=M` if it sends states to another port; `?world_port=W` for `simulation`. `fci://HOST` for a
-            Franka arm, `xarm://HOST` for one of UFACTORY.
+            Franka arm, `xarm://HOST` for one of UFACTORY, `realman://HOST:PORT` for one of RealMan.
         model: The arm, with its tool and load; None uses the arm that the controller reports. Without `apply`, the
             session's model has the controller's tool.
         timeout: Timeout of the connection, of the first state, and of every response, [s].

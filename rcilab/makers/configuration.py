@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+import numpy as np
+
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
@@ -24,6 +26,7 @@ SetupPart: TypeAlias = Literal["box", "tool", "load", "force", "joints", "contro
 
 SETUP_PARTS: tuple[SetupPart, ...] = ("box", "tool", "load", "force")
 """The parts with a position in space."""
+_DIGITS = 6  # Of the ratio of jerk to acceleration: the limits after several changes do not depend on their order.
 _ALL_PARTS: tuple[SetupPart, ...] = (*SETUP_PARTS, "joints", "control")
 
 
@@ -83,7 +86,7 @@ class ControllerParameters(Mapping[str, tuple[float, ...]]):
         if "joint_velocity" in self:
             joint = replace(joint, velocity=readonly_copy(self["joint_velocity"]))
         if "joint_acceleration" in self:
-            rise = joint.jerk / joint.acceleration
+            rise = np.round(joint.jerk / joint.acceleration, _DIGITS)
             acceleration = readonly_copy(self["joint_acceleration"])
             joint = replace(joint, acceleration=acceleration, jerk=readonly_copy(rise * acceleration))
         if "tool_limits" in self:
@@ -92,10 +95,10 @@ class ControllerParameters(Mapping[str, tuple[float, ...]]):
                 tool,
                 translation_velocity=v,
                 translation_acceleration=a,
-                translation_jerk=tool.translation_jerk / tool.translation_acceleration * a,
+                translation_jerk=round(tool.translation_jerk / tool.translation_acceleration, _DIGITS) * a,
                 rotation_velocity=w,
                 rotation_acceleration=alpha,
-                rotation_jerk=tool.rotation_jerk / tool.rotation_acceleration * alpha,
+                rotation_jerk=round(tool.rotation_jerk / tool.rotation_acceleration, _DIGITS) * alpha,
             )
         return (
             limits

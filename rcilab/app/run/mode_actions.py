@@ -20,7 +20,7 @@ from rcilab.core.errors import RcilabError
 from rcilab.core.state import MODES, Mode
 from rcilab.i18n.number_parsing import parse_number
 from rcilab.i18n.translator import Message, message
-from rcilab.makers.configuration import RobotConfiguration
+from rcilab.makers.configuration import ControllerParameters, RobotConfiguration
 from rcilab.makers.maker import parameters_of
 from rcilab.makers.parameters import default_parameters
 from rcilab.motion.speed_scaling import MIN_SPEED_OVERRIDE
@@ -142,16 +142,14 @@ class ModeActions:
         if before is None and not self._keeps_rest:
             before = default_parameters(groups)
         control = with_number(before, group, request.index, request.value)
-        self._store.update(drive=replace(state.drive, control=control, refusal=None))
+        self._take(control)
 
     def press(self, request: PressControl) -> None:
         """Sends the parameters, or resets them to the controller's defaults."""
         state, now = self._store.state, time.monotonic()
         if request.what == "reset":
-            control = default_parameters(parameters_of(state.model))
-            drive = replace(state.drive, control=control, refusal=None)
             self._store.clear_problems("control.")
-            self._store.update(drive=drive)
+            self._take(default_parameters(parameters_of(state.model)))
             return
         if state.target != "virtual" and now - self._asked_to_send > CONFIRM_TIMEOUT:
             self._asked_to_send = now
@@ -181,6 +179,12 @@ class ModeActions:
         self._sender.forget()
         self._changing, self._was_running = None, False
         self._store.update(drive=replace(self._store.state.drive, override_refusal=None))
+
+    def _take(self, control: ControllerParameters) -> None:
+        """Replaces the parameters, and the limits of the arm among them."""
+        state = self._store.state
+        model = RobotConfiguration(control=control).applied_to(state.model)
+        self._store.update(drive=replace(state.drive, control=control, refusal=None), model=model)
 
     def _send(self, status: SupervisorStatus) -> None:
         state = self._store.state

@@ -32,12 +32,10 @@ def parameter_groups(model: RobotModel) -> tuple[ParameterGroup, ...]:
         ParameterGroup(
             name="tool_limits",
             parameters=(
-                _number(message("control.limit.tool_velocity"), FASTEST_TOOL, speed, "m/s"),
-                _number(message("control.limit.tool_acceleration"), STRONGEST_TOOL, acceleration, "m/s²"),
-                _number(message("control.limit.tool_rotation_velocity"), FASTEST_TOOL, rotation_speed, "rad/s"),
-                _number(
-                    message("control.limit.tool_rotation_acceleration"), STRONGEST_TOOL, rotation_acceleration, "rad/s²"
-                ),
+                _number(message("control.tip_velocity"), FASTEST_TOOL, speed, "m/s"),
+                _number(message("control.tip_acceleration"), STRONGEST_TOOL, acceleration, "m/s²"),
+                _number(message("control.tip_rotation_velocity"), FASTEST_TOOL, rotation_speed, "rad/s"),
+                _number(message("control.tip_rotation_acceleration"), STRONGEST_TOOL, rotation_acceleration, "rad/s²"),
             ),
             modes=MODES,
         ),
