@@ -126,8 +126,8 @@ class FaultDemo:
     def _as_motion(self, q: Array) -> Motion:
         """Returns the joint angles of all rows, shape (N, n), [rad], as a motion; dropped states are interpolated."""
         period, known = state_cycles(self.cycles), self.whole["message_id"].astype(np.float64)
-        wanted = np.arange(known[0], known[-1] + 1.0, period)
-        every = [np.interp(wanted, known, q[:, joint]) for joint in range(q.shape[1])]
+        wanted: Array = np.arange(float(known[0]), float(known[-1]) + 1.0, period)
+        every: list[Array] = [np.interp(wanted, known, q[:, joint]) for joint in range(q.shape[1])]
         return Motion.from_cycles(np.stack(every, axis=1), period)
 
     def describe(

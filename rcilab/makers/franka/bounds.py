@@ -32,5 +32,7 @@ def require_payload(mass: float, mounted: float, arm: RobotDescription) -> None:
         return
     what = f"kg and {mounted:g} kg of the end effector are" if mounted else "kg is"
     error = InvalidValueError("mass", float(f"{mass:.9g}"), f"{what} above {most:g} kg, the rated payload")
-    code = "load_heavy_mounted" if mounted else "load_heavy"
-    raise error.coded(code, mass=f"{mass:g}", mounted=f"{mounted:g}", most=f"{most:g}", model=arm.name)
+    facts = {"mass": f"{mass:g}", "most": f"{most:g}", "model": arm.name}
+    if mounted:
+        raise error.coded("load_heavy_mounted", mounted=f"{mounted:g}", **facts)
+    raise error.coded("load_heavy", **facts)

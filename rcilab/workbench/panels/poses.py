@@ -31,7 +31,7 @@ class PosesPanel:
         text, ask = self._text, self._ask
         with gui.add_folder(text("jog.poses")):
             gui.add_html('<i class="rl-poses"></i>')
-            shown = [name for name in _NAMES if name != "zero" or has_zero_pose(state.model)]
+            shown: list[_Name] = [name for name in _NAMES if name != "zero" or has_zero_pose(state.model)]
             names: dict[str, _Name] = {text(f"jog.{name}"): name for name in shown}
             named = gui.add_button_group(" ", list(names))
 
