@@ -365,9 +365,12 @@ class _MotionChecker:
         )
 
     def _time(self, condition: Condition, first_time: float, row: int) -> float:
-        """Returns the time of a row, [s]; in those after the end the arm is still where the motion ends."""
+        """Returns the time of a row, [s]; in those after the end the arm is still where the motion ends.
+
+        A pose that was refused follows the motion.
+        """
         time = first_time + row * CYCLE_TIME
-        return time if condition.order else min(time, self._motion.duration)
+        return time if condition.order or condition.signal == "frame" else min(time, self._motion.duration)
 
 
 def _limits_of(motion: Motion, limits: Limits, start: StartState) -> Limits:

@@ -168,7 +168,8 @@ def _check(
         motion = replace(motion, notes=(*motion.notes, *note))
         given = mode or recorded
         report = check_commands(motion, model, record, start=start, box=box, distance=distance, mode=given)
-        return _with_broken(report, model, "joint", sent.not_finite)
+        order = int(np.isfinite(run.cycles["command_dq"]).any())  # Velocities, or positions.
+        return _with_broken(report, model, "joint", sent.not_finite, order)
 
     if run.truncated:
         motion, state = _in_progress(motion)
@@ -261,12 +262,20 @@ def _empty(run: Run, otherwise: str) -> UsageError:
     return UsageError(f"there are no cycles in this run: {run.missing_end}" if is_lost else otherwise)
 
 
-def _with_broken(report: Report, model: RobotModel, signal: Signal, joint: int) -> Report:
-    """Returns a report with the violation of a command after the others that is not finite; as it is for joint 0."""
+def _with_broken(report: Report, model: RobotModel, signal: Signal, joint: int, order: int = 0) -> Report:
+    """Returns a report with the violation of a command after the others that is not finite; as it is for joint 0.
+
+    Args:
+        report: The report on the commands before.
+        model: The arm.
+        signal: That was commanded,
+        joint: for this joint, from 1; 0 for none,
+        order: as this derivative.
+    """
     if not joint:
         return report
-    rows = (row.condition for row in report.rows if row.condition.signal == signal and row.fault is not None)
-    condition = min(rows, key=lambda row: row.order)
+    rows = [row.condition for row in report.rows if row.condition.signal == signal and row.fault is not None]
+    condition = min((row for row in rows if row.order >= order), key=lambda row: row.order)
     return with_refusal(report, condition, model.limits, report.motion.duration + CYCLE_TIME, joint=joint)
 
 

@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import rcilab
 from rcilab.core.arrays import Array
-from rcilab.core.errors import ModelError
 from rcilab.core.rotation import rotation_vector
 from rcilab.core.spatial import Pose
 from rcilab.makers.realman.robots import ROBOTS
@@ -147,8 +145,3 @@ def test_every_solution_of_the_makers_library_is_among_ours(name: str, library: 
             assert np.abs(np.mod(ours - theirs + np.pi, 2.0 * np.pi) - np.pi).max(axis=1).min() < 2e-3
             compared += 1
     assert compared > (95 if model.n == 7 else 400)
-
-
-def test_a_session_reports_that_there_is_no_driver_and_what_to_use():
-    with pytest.raises(ModelError, match="no driver in rcilab: run rcilab controller --model RM65"):
-        rcilab.simulate(load_model("RM65"))
