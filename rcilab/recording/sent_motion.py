@@ -168,7 +168,8 @@ def _check(
         motion = replace(motion, notes=(*motion.notes, *note))
         given = mode or recorded
         report = check_commands(motion, model, record, start=start, box=box, distance=distance, mode=given)
-        order = int(np.isfinite(run.cycles["command_dq"]).any())  # Velocities, or positions.
+        names = run.cycles.dtype.names or ()
+        order = int("command_dq" in names and np.isfinite(run.cycles["command_dq"]).any())  # Velocities, or positions.
         return _with_broken(report, model, "joint", sent.not_finite, order)
 
     if run.truncated:

@@ -126,7 +126,7 @@ def _build_target(
             return _circle(controller, values, task)
         case Function.MOVE_RELATIVE if values[11]:
             end = controller.find_end().q
-            q = tuple(old + step for old, step in zip(end, values, strict=False))
+            q = tuple(old + (0.0 if isinf(step) else step) for old, step in zip(end, values, strict=False))
             speed = _joint_speed(controller, *values[7:9])
             return JointTarget(id=task, q=q, speed=speed, blend=_blend(values[10])), any(values[13:14])
         case _:

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 from rcilab.core.spatial import Pose
 from rcilab.makers.ufactory.bounds import JOINT_ACCELERATION, JOINT_VELOCITY, TOOL_ACCELERATION
-from rcilab.makers.ufactory.controller.settings import TOOL_SPEED
 from rcilab.makers.ufactory.controller.xarm_controller import XArmController
 from rcilab.makers.ufactory.wire.identity import FIRMWARE, Identity
 from rcilab.makers.ufactory.wire.poses import (
@@ -96,7 +95,7 @@ def _rich(controller: XArmController, identity: Identity) -> dict[str, ReportVal
         "version": FIRMWARE.encode(),
         "tcp_limits": (
             settings.tool_jerk / MILLIMETRE, weak_tool, TOOL_ACCELERATION / MILLIMETRE,
-            slow_tool, TOOL_SPEED / MILLIMETRE,
+            slow_tool, limits.cartesian.translation_velocity / MILLIMETRE,
         ),
         "joint_limits": (settings.joint_jerk, weak_joint, JOINT_ACCELERATION, slow_joint, JOINT_VELOCITY),
         "rotation_limits": (limits.cartesian.rotation_jerk, limits.cartesian.rotation_acceleration),

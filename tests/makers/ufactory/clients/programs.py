@@ -84,6 +84,8 @@ def joints(host: str) -> object:
         codes.append(arm.set_servo_angle(angle=[angle + 0.02 * len(codes) for angle in Q6], speed=2.0, radius=radius))
     codes.append(arm.set_pause_time(0.1))
     codes.append(arm.set_servo_angle(angle=[0.1] * 6, relative=True, speed=2.0, wait=True))
+    codes.append(arm.set_servo_angle(servo_id=1, angle=-0.1, relative=True, speed=2.0, wait=True))
+    codes.append(arm.set_servo_angle(servo_id=1, angle=0.1, relative=True, speed=2.0, wait=True))
     last = list(arm.get_servo_angle()[1][:6])
     codes.append(arm.move_gohome(speed=3.0, wait=True))
     return {"codes": codes, "last": last, "home": arm.get_servo_angle()[1][:6]}
