@@ -367,10 +367,11 @@ class _MotionChecker:
     def _time(self, condition: Condition, first_time: float, row: int) -> float:
         """Returns the time of a row, [s]; in those after the end the arm is still where the motion ends.
 
-        A pose that was refused follows the motion.
+        Differences and torques change there, and a pose that was refused follows the motion.
         """
         time = first_time + row * CYCLE_TIME
-        return time if condition.order or condition.signal == "frame" else min(time, self._motion.duration)
+        is_place = not condition.order and condition.signal not in ("torque", "frame")
+        return min(time, self._motion.duration) if is_place else time
 
 
 def _limits_of(motion: Motion, limits: Limits, start: StartState) -> Limits:
