@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rcilab.core.arrays import Array
 from rcilab.core.errors import SingularError, UnreachableError
 from rcilab.core.spatial import IDENTITY, Pose, rotation_between
-from rcilab.model.dynamics.rigid_body import Twist
 from rcilab.model.robot_model import RobotModel
+
+if TYPE_CHECKING:
+    from rcilab.model.dynamics.rigid_body import Twist  # Which imports pinocchio.
 
 _CONVERGING = 1e-8  # [m], [rad] The next step reduces a smaller error to rounding, as each squares it.
 _NEAR = 1e-3  # [m], [rad] The Jacobian of a smaller error serves for the following steps, too.

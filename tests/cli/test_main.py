@@ -58,7 +58,7 @@ def test_a_bare_option_belongs_to_the_workbench(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(workbench, "run", run)
     assert main(["--model", "xMate3", "--no-browser"]) == 2
     assert main([]) == 2
-    assert [args.model for args in asked] == ["xMate3", "xMatePro7"]
+    assert [(args.model, args.robot) for args in asked] == [("xMate3", "virtual"), (None, "virtual")]
 
 
 def test_naming_the_commands_loads_no_heavy_library() -> None:
