@@ -90,8 +90,9 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
         row, error = blocked
         raise path_error(path, row / (len(knots) - 1), error)
     allowed = _path_bounds(path, knots, bounds)
-    cycles = max(2, math.ceil(_longest_reversal(bounds) / CYCLE_TIME))
     fastest, slowdown = FastestLaw(allowed), np.ones(len(allowed.knots))
+    reversal = _longest_reversal(bounds, path, allowed.knots, fastest.slowed(slowdown))
+    cycles = max(2, math.ceil(reversal / CYCLE_TIME))
     worst = 0.0
     for attempt in range(2 * _ROUNDS):
         law = smooth_law(allowed.knots, fastest.slowed(slowdown), cycles)
@@ -190,10 +191,23 @@ def _bounds(model: RobotModel, part: float) -> _Bounds:
     )
 
 
-def _longest_reversal(bounds: _Bounds) -> float:
-    """Returns the longest time from full deceleration to full acceleration, [s]."""
+def _longest_reversal(bounds: _Bounds, path: Path, knots: Array, squares: Array) -> float:
+    """Returns the longest time from full deceleration to full acceleration, [s].
+
+    The tool's is that of the acceleration on this path: an xArm's tool may have 50 m/s^2, more than its joints allow,
+    which would take 1 s to reverse.
+
+    Args:
+        bounds: Bounds of joints and tool.
+        path: The path.
+        knots: Values of s, shape (K + 1,).
+        squares: Largest squares of s' at the knots, shape (K + 1,), [1/s^2].
+    """
     _, acceleration, jerk = bounds.tool
-    return 2.0 * max(float((bounds.acceleration / bounds.jerk).max()), acceleration / jerk)
+    along, toward = (float(np.abs(rows).max()) for rows in _tool_rows(path))
+    rate_change = float(np.abs(np.diff(squares) / (2.0 * np.diff(knots))).max())
+    reached = min(acceleration, along * rate_change + toward * float(squares.max()))
+    return 2.0 * max(float((bounds.acceleration / bounds.jerk).max()), reached / jerk)
 
 
 def _columns(path: Path, rows: JointPath, shares: Array) -> Array:
