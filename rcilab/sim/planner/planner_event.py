@@ -27,7 +27,7 @@ class Refusal:
     remark: Remark
     """As a sentence, with the values."""
     share: float = 0.0
-    """Where on the path of the target, 0 to 1; 1 where the target itself is out of reach."""
+    """Where on the path of the target, 0 to 1; 1 if its end has no joint angles, wherever the path leaves the reach."""
     joint: int | None = None
     """Number of the joint, from 1, for JOINT_RANGE."""
     value: float | None = None

@@ -287,9 +287,22 @@ def test_a_target_out_of_reach_is_refused_before_it_begins(model: RobotModel) ->
     assert [event[:2] for _, event in events] == [(1, BEGAN), (1, REACHED), (2, REFUSED), (3, DISCARDED)]
     refusal = events[2][1].refusal
     assert refusal is not None
-    assert refusal.reason in (RefusalReason.UNREACHABLE, RefusalReason.SINGULAR, RefusalReason.JOINT_RANGE)
-    assert 0.0 < refusal.share < 1.0
+    assert refusal.reason in (RefusalReason.UNREACHABLE, RefusalReason.SINGULAR)
+    assert refusal.share == 1.0
     np.testing.assert_allclose(model.position_path(rows)[-1], near.pose.position, atol=1e-8)
+
+
+def test_a_path_that_leaves_the_reach_is_refused_at_that_place() -> None:
+    model = load_model("xArm6")
+    q = np.array([0.2, -0.5, -0.8, 0.1, 1.1, 0.3])
+    start = model.forward(q)
+    x, y, _ = start.position
+    planner = Planner(model, model.limits, q.tolist())
+    planner.add(LineTarget(id=1, pose=shifted(start, -2.0 * x, -2.0 * y, 0.0), speed=SLOW))  # Over the base.
+    _, ((_, event),) = drive(planner)
+    assert event.refusal is not None
+    assert event.refusal.reason in (RefusalReason.UNREACHABLE, RefusalReason.SINGULAR)
+    assert 0.0 < event.refusal.share < 1.0
 
 
 def test_a_joint_beyond_its_range_is_named(model: RobotModel) -> None:
