@@ -287,12 +287,12 @@ def _circle(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> Circle:
     if chords[0] <= STANDSTILL_DISTANCE:
         raise PlanningError(
             f"two of the three points of the arc are the same (start {_text(a)}, via {_text(b)}, goal {_text(c)}); "
-            "an arc needs three different points; plan_circle plans a full circle"
+            "an arc needs three different points"
         ).coded("arc_same")
     if float(np.linalg.norm(normal)) <= _COLLINEAR * chords[1] * chords[2]:
         raise PlanningError(
             f"the three points of the arc lie on a line (start {_text(a)}, via {_text(b)}, goal {_text(c)}); "
-            "move via off the line, or plan a straight line with plan_line or move_l"
+            "move via off the line, or use a straight line"
         ).coded("arc_line")
     # The circumcentre seen from a: https://en.wikipedia.org/wiki/Circumcircle, "higher dimensions".
     spread = float(to_b @ to_b) * to_c - float(to_c @ to_c) * to_b

@@ -121,7 +121,7 @@ def test_an_arc_starts_at_start_passes_via_ends_at_goal_and_keeps_its_radius(a, 
 @pytest.mark.parametrize(
     ("via", "goal", "hint"),
     [
-        ((0.1, 0.0, 0.0), (0.2, 0.0, 0.0), "lie on a line .* plan a straight line with plan_line or move_l"),
+        ((0.1, 0.0, 0.0), (0.2, 0.0, 0.0), "lie on a line .* use a straight line"),
         ((0.1, 0.0, 0.0), (0.0, 0.0, 0.0), "two of the three points of the arc are the same"),
     ],
 )

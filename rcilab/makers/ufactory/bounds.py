@@ -31,6 +31,7 @@ a fifth at 5; rcilab's own values: the maker publishes no forces."""
 DEFAULT_SENSITIVITY: Final = 3  # Of both; rcilab's own value, the maker's is that of the last `save_conf`.
 
 LONGEST_TOOL: Final = 2.0  # [m] Distance of a frame, or of a centre of mass, from the flange; rcilab's own bound.
+FARTHEST_FRAME: Final = 100.0  # [m] Distance of the user frame from the base; rcilab's own bound.
 
 REPORT_PERIOD: Final = 0.005  # [s] Of the reports in real time, each of which a motion answers with a target.
 OUTPUTS: Final = (*(f"CO{k}" for k in range(8)), *(f"DO{k}" for k in range(8)))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from struct import unpack
 from typing import Any, NamedTuple, TypeAlias
 
@@ -15,6 +16,7 @@ from rcilab.makers.ufactory.controller.settings import MILLIMETRE
 from rcilab.makers.ufactory.controller.signals import BOX_SIGNALS, TOOL_SIGNALS
 from rcilab.makers.ufactory.controller.xarm_controller import XArmController
 from rcilab.makers.ufactory.wire.functions import Function, encode_values
+from rcilab.makers.ufactory.wire.modbus import ModbusError
 
 TOOL_HOST = 9
 _BAUD, _BAUD_TO_WRITE, _INPUT_3, _INPUTS, _OUTPUTS_TO_SET, _ANALOG, _OUTPUTS = (
@@ -129,26 +131,28 @@ class IoRequests:
 
     def write_tool(self, host: int, address: int, value: float, sync: bool) -> IoReply:
         """Writes a register of the tool's board, or of the gripper behind it."""
+        number = _whole(value, 16)
         if host == GRIPPER_ID:
-            self.controller.gripper.write_holding(address, [round(value) & 0xFFFF])
+            self._write_gripper(address, [number])
         elif address == _OUTPUTS_TO_SET:
-            return self.set_bits((round(value),), BOX_SIGNALS, sync)
+            return self.set_bits((number,), BOX_SIGNALS, sync)
         elif address in (_BAUD, _BAUD_TO_WRITE):
-            self._baud = round(value)
+            self._baud = number
         return b""
 
     def write_tool_32(self, host: int, address: int, value: float) -> bytes:
         """Writes a target of the gripper."""
+        number = _whole(value, 32)
         if host == GRIPPER_ID:
-            number = round(value) & 0xFFFFFFFF
-            self.controller.gripper.write_holding(address, [number >> 16, number & 0xFFFF])
+            self._write_gripper(address, [number >> 16, number & 0xFFFF])
         return b""
 
     def read_tool(self, host: int, address: int, registers: int = 1) -> bytes:
         """Returns a register of the tool's board, or of the gripper behind it, as 32 bits."""
         signals = self.controller.signals
         if host == GRIPPER_ID:
-            found = self.controller.gripper.read_holding(address, registers)
+            with _known_register(address):
+                found = self.controller.gripper.read_holding(address, registers)
             return encode_values("H", *([0] * (2 - registers) + found))
         values = {
             _BAUD: self._baud,
@@ -158,6 +162,10 @@ class IoRequests:
             **dict.fromkeys(_VERSION, 1),
         }
         return encode_values("i", values.get(address, 0))
+
+    def _write_gripper(self, address: int, registers: list[int]) -> None:
+        with _known_register(address):
+            self.controller.gripper.write_holding(address, registers)
 
     def pass_on(self, payload: bytes) -> bytes:
         """Returns the answer of a device on the serial bus: its host, and its frame; b"" if none answers."""
@@ -178,6 +186,23 @@ class IoRequests:
             raise InvalidValueError("signal", signal, f"does not exist; known: 0 to {BOX_SIGNALS - 1}")
         functions[signal] = function
         return b""
+
+
+def _whole(value: float, bits: int) -> int:
+    """Returns a number that the client sends as a float as the bits of a register, of either sign."""
+    least, most = -(1 << bits - 1), (1 << bits) - 1
+    if not least <= value <= most:
+        raise InvalidValueError("register value", value, f"must be {least} to {most}")
+    return round(value) & most
+
+
+@contextmanager
+def _known_register(address: int) -> Iterator[None]:
+    """Raises InvalidValueError where the gripper has no such register."""
+    try:
+        yield
+    except ModbusError:
+        raise InvalidValueError("register", f"0x{address:04x}", "does not exist in the gripper") from None
 
 
 def _sync(values: tuple[Any, ...], at: int) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from rcilab.core.errors import PlanningError
 from rcilab.core.spatial import Pose
 from rcilab.makers.ufactory.wire.poses import (
+    pose_as_mm_rotation,
     pose_as_mm_rpy,
     pose_from_mm_rotation,
     pose_from_mm_rpy,
@@ -88,7 +89,7 @@ def absolute_pose(values: Sequence[float], end: Pose, T_base_user: Pose, *, is_r
         is_rotation_vector: Which of both the rotation is.
     """
     if any(map(isinf, values)):
-        present = pose_as_mm_rpy(T_base_user.inverse() @ end)
+        present = (pose_as_mm_rotation if is_rotation_vector else pose_as_mm_rpy)(T_base_user.inverse() @ end)
         values = [old if isinf(new) else new for new, old in zip(values, present, strict=True)]
     return T_base_user @ (pose_from_mm_rotation(values) if is_rotation_vector else pose_from_mm_rpy(values))
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.core.spatial import Pose
+from rcilab.makers.ufactory.controller.information_requests import INFORMATION_HANDLERS
 from rcilab.makers.ufactory.controller.io_requests import IO_HANDLERS, IoRequests
 from rcilab.makers.ufactory.controller.motion_requests import MOTIONS, handle_motion
+from rcilab.makers.ufactory.controller.pose_search import find_nearest_angles
 from rcilab.makers.ufactory.controller.reporter import padded, user_pose
 from rcilab.makers.ufactory.controller.settings import (
     MILLIMETRE,
@@ -28,6 +30,7 @@ from rcilab.makers.ufactory.wire.poses import (
     pose_from_mm_rotation,
     pose_from_mm_rpy,
 )
+from rcilab.makers.ufactory.wire.refused_answers import refused_payload
 from rcilab.sim.channels import Peer
 from rcilab.sim.planner import EventKind
 from rcilab.sim.planner.preparation import refusal_of
@@ -74,6 +77,7 @@ class RequestHandlers:
                 return self._handle_io(peer, request, function, values)
             settings = apply_setting(self._controller.settings, function, values)
             if settings is not None:
+                self._controller.require_settings(settings)
                 if function in RESETTING:
                     self._controller.reset_state()
                 self._controller.configure(settings)
@@ -84,13 +88,13 @@ class RequestHandlers:
                 return Reply(is_setting=True)
             return self._get(peer, request, function, values)
         except InvalidValueError as error:
-            self._warn(function, UfactoryWarning.PARAMETER, str(error))
-            return Reply(is_invalid=function not in MOTIONS)
+            self.refuse(function.name, UfactoryWarning.PARAMETER, str(error))
+            return Reply(refused_payload(function, values), is_invalid=function not in MOTIONS)
 
     def _move(self, peer: Peer, request: Frame, function: Function, values: tuple[Any, ...]) -> Reply:
         controller = self._controller
         if controller.is_full:
-            self._warn(function, UfactoryWarning.QUEUE_FULL, "the queue is full")
+            self.refuse(function.name, UfactoryWarning.QUEUE_FULL, "the queue is full")
             return Reply()
         number = self._tasks.add(Task(peer, request, self.feedback.get(peer, 0)))
         try:
@@ -140,28 +144,34 @@ class RequestHandlers:
             case Function.GET_IK:
                 return self._solve(values)
             case _:
-                handler = _SIMPLE.get(function)
-                if handler is None:
-                    self._warn(function, UfactoryWarning.UNKNOWN_COMMAND, "it does not exist here")
-                    return Reply()
-                found = handler(controller, self._identity, values)
-                return Reply(found)
+                if function in INFORMATION_HANDLERS:
+                    return Reply(INFORMATION_HANDLERS[function](controller, values))
+                return Reply(_SIMPLE[function](controller, self._identity, values))
 
     def _solve(self, values: tuple[Any, ...]) -> Reply:
         """Answers the joint angles of a pose, nearest to those given, or to the arm's."""
         controller = self._controller
-        near = list(values[7 : 7 + controller.model.n]) or controller.planner.q
-        pose = controller.settings.T_base_user @ pose_from_mm_rpy(values[:6])
+        is_limited = bool(values[6]) if len(values) > 6 else True
+        near = values[7 : 7 + controller.model.n] or controller.planner.q
         try:
-            q = controller.end.solver.nearest(pose, near)
+            q = _find_angles(controller, values[:6], near, is_limited=is_limited)
         except KinematicsError as error:
-            self._warn(Function.GET_IK, UfactoryWarning.NO_SOLUTION, str(error))
-            return Reply(is_invalid=True)
+            self.refuse(Function.GET_IK.name, UfactoryWarning.NO_SOLUTION, str(error))
+            return Reply(refused_payload(Function.GET_IK), is_invalid=True)
         return Reply(encode_values("f", *padded(q)))
 
-    def _warn(self, function: Function, warning: UfactoryWarning, reason: str) -> None:
+    def refuse(self, name: str, warning: UfactoryWarning, reason: str) -> None:
+        """Raises a warning, and logs why a request, by its name, is refused."""
         self._controller.warn(warning)
-        self._log(function.name, f"{warning.manual_name}, {warning.cause}: {reason}")
+        self._log(name, f"{warning.manual_name}, {warning.cause}: {reason}")
+
+
+def _find_angles(
+    controller: XArmController, values: tuple[float, ...], near: Sequence[float], *, is_limited: bool = False
+) -> list[float]:
+    """Returns the joint angles inside the ranges of motions, [rad], that put the tool at a pose of the user frame."""
+    pose = controller.settings.T_base_user @ pose_from_mm_rpy(values)
+    return find_nearest_angles(controller.model, controller.motion_limits.joint, pose, near, is_limited=is_limited)
 
 
 def _forward(controller: XArmController, q: tuple[float, ...]) -> Pose:
@@ -182,10 +192,10 @@ def _is_joint_limit(controller: XArmController, q: tuple[float, ...]) -> bytes:
 
 def _is_tcp_limit(controller: XArmController, values: tuple[float, ...]) -> bytes:
     try:
-        pose = controller.settings.T_base_user @ pose_from_mm_rpy(values)
-        return _is_joint_limit(controller, tuple(controller.end.solver.nearest(pose, controller.planner.q)))
+        _find_angles(controller, values, controller.planner.q)
     except KinematicsError:
         return b"\1"
+    return b"\0"
 
 
 def _reduced_state(controller: XArmController) -> bytes:

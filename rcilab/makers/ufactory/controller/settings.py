@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import hypot, inf, isfinite
 from typing import Any
@@ -14,6 +15,7 @@ from rcilab.makers.ufactory.bounds import (
     DEFAULT_JOINT_JERK,
     DEFAULT_SENSITIVITY,
     DEFAULT_TOOL_JERK,
+    FARTHEST_FRAME,
     JOINT_ACCELERATION,
     JOINT_JERK,
     JOINT_VELOCITY,
@@ -158,9 +160,9 @@ def apply_setting(settings: Settings, function: Function, values: tuple[Any, ...
     """
     match function:
         case Function.SET_TCP_OFFSET:
-            return replace(settings, T_flange_tool=_require_near(pose_from_mm_rpy(values)))
+            return replace(settings, T_flange_tool=_require_near("tool offset", values, LONGEST_TOOL))
         case Function.SET_WORLD_OFFSET:
-            return replace(settings, T_base_user=pose_from_mm_rpy(values))
+            return replace(settings, T_base_user=_require_near("world offset", values, FARTHEST_FRAME))
         case Function.SET_LOAD:
             mass, *centre = values
             return replace(settings, load=Payload(mass=mass, center_of_mass=MILLIMETRE * np.array(centre)))
@@ -247,19 +249,20 @@ def _with_thresholds(settings: Settings) -> Settings:
 
 def _with_ranges(settings: Settings, values: tuple[float, ...]) -> Settings:
     n = len(settings.joint_lower)
-    lower, upper = values[0 : 2 * n : 2], values[1 : 2 * n : 2]
-    if not all(isfinite(low) and isfinite(high) and low < high for low, high in zip(lower, upper, strict=True)):
-        raise InvalidValueError("reduced ranges", list(values), "rad: need a least and a larger angle for each joint")
-    return replace(
-        settings,
-        reduced_lower=tuple(map(max, lower, settings.joint_lower)),
-        reduced_upper=tuple(map(min, upper, settings.joint_upper)),
-    )
+    given = values[: 2 * n]
+    lower = tuple(map(max, given[::2], settings.joint_lower))
+    upper = tuple(map(min, given[1::2], settings.joint_upper))
+    if not (all(map(isfinite, given)) and all(low < high for low, high in zip(lower, upper, strict=True))):
+        problem = "rad: need a least and a larger angle for each joint, with a part of its range between them"
+        raise InvalidValueError("reduced ranges", list(given), problem)
+    return replace(settings, reduced_lower=lower, reduced_upper=upper)
 
 
-def _require_near(pose: Pose) -> Pose:
-    if not hypot(*pose.parts[1]) <= LONGEST_TOOL:
-        raise InvalidValueError("tool offset", pose.position.tolist(), f"must be at most {LONGEST_TOOL:g} m long")
+def _require_near(name: str, values: Sequence[float], most: float) -> Pose:
+    """Returns the pose of an offset in mm and rad, whose length is bounded in m."""
+    pose = pose_from_mm_rpy(values)
+    if not hypot(*pose.parts[1]) <= most:
+        raise InvalidValueError(name, list(values[:3]), f"must be at most {most / MILLIMETRE:g} mm long")
     return pose
 
 

@@ -112,6 +112,7 @@ class XArmController:
         warning: The warning that is set, or None.
         enabled: Joints with motors on, a bit each.
         reason: Reason for the last error, as a sentence with numbers.
+        reasons: The same of each error, when it last came.
         counter: Of the client (`set_counter_increase`).
         state: Not to be confused with `robot_state`: the state in reports.
         ignored: Servo commands that came faster than 250 Hz.
@@ -136,6 +137,7 @@ class XArmController:
         self.warning: UfactoryWarning | None = None
         self.enabled = 0
         self.reason = Remark("")
+        self.reasons: dict[UfactoryError, Remark] = {}
         self.counter = 0
         self.ignored = 0
         self.button: SafetyButton = "none"
@@ -263,6 +265,7 @@ class XArmController:
         settings = apply_setup(self.settings, setup)
         if setup.q is not None:
             require_stand(self.model.with_tool(settings.T_flange_tool), setup.q, settings, self.arm.plant)
+        self.require_settings(settings)
         self.configure(settings)
         if setup.q is not None:
             self._feed.abort()
@@ -281,8 +284,17 @@ class XArmController:
         """Raises UsageError: this arm is guided in mode 2."""
         raise UsageError("this arm has no buttons for guiding: set mode 2 and then state 0")
 
+    def require_settings(self, settings: Settings) -> None:
+        """Requires settings that the arm can take, before they are applied.
+
+        Raises:
+            InvalidValueError: The load is heavier than the rated payload.
+        """
+        if settings.load is not self.settings.load:
+            self.model.with_load(settings.load)
+
     def configure(self, settings: Settings) -> None:
-        """Applies settings; the arm takes those of frames, load and limits as soon as it stands."""
+        """Applies settings that were checked; the arm takes those of frames, load and limits as soon as it stands."""
         before, self.settings = self.settings, settings
         if any(getattr(before, name) is not getattr(settings, name) for name in _OF_THE_ARM):
             self._is_outdated = True
@@ -308,11 +320,13 @@ class XArmController:
     def enable(self, axis: int, on: bool) -> bool:
         """Switches the motor of a joint, 1 to 7, or of all; returns False for another number.
 
-        It ends what moves, as STOPPED does.
+        It ends what moves, as STOPPED does, unless the motors are already on.
         """
         if not (1 <= axis <= self.model.n or axis == ALL_AXES):
             return False
         bits = self._all if axis == ALL_AXES else 1 << (axis - 1)
+        if on and self.enabled & bits == bits:
+            return True
         self.enabled = self.enabled | bits if on else self.enabled & ~bits
         self._end_motions()
         self._set_state = State.STOPPED
@@ -427,6 +441,7 @@ class XArmController:
     def fail(self, error: UfactoryError, reason: Remark) -> None:
         """Sets an error and stops the arm."""
         self.error, self.reason = error, reason
+        self.reasons[error] = reason
         if error in _BUTTONS.values() or UfactoryError.JOINT_1 <= error <= UfactoryError.JOINT_7:
             self.enabled = 0
         self._end_motions()

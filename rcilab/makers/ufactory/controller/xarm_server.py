@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
+from traceback import extract_tb
 
 from rcilab.core.errors import DecodeError
 from rcilab.makers.ufactory.bounds import CLIENT_PORT
@@ -31,15 +31,16 @@ from rcilab.makers.ufactory.wire.frame import (
 )
 from rcilab.makers.ufactory.wire.functions import Function, decode_payload
 from rcilab.makers.ufactory.wire.identity import IDENTITIES
-from rcilab.makers.ufactory.wire.modbus import answer_modbus
+from rcilab.makers.ufactory.wire.modbus import ModbusException, answer_modbus, refuse_modbus
+from rcilab.makers.ufactory.wire.refused_answers import refused_payload
 from rcilab.makers.ufactory.wire.reports import REPORTS, ReportLayout
+from rcilab.makers.ufactory.wire.unix_sockets import unix_socket_path
 from rcilab.sim.channels import ClientLink, Peer, TcpChannel
 from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.virtual_arm import VirtualArm
 
 _PROTOCOL = "xArm protocol"
 _MOST_CLIENTS = 16  # Of one port; a tuning value.
-_SOCKET_NAME = "xarmcontroller_uds_{}"  # In the system's temporary folder, where clients look for it.
 _NOT_READY = (State.STOPPED, State.CHANGED)
 _FUNCTIONS = frozenset(Function)
 
@@ -116,11 +117,16 @@ class XArmServer:
         request = decode_frame(frame)
         if request.protocol == HEARTBEAT:
             return
-        if request.protocol == MODBUS:
-            response = encode_modbus_response(request, answer_modbus(request.payload, self._registers))
-        else:
-            reply = self._handle(peer, request)
-            response = encode_response(request, self._status(reply), reply.payload)
+        is_modbus = request.protocol == MODBUS
+        try:
+            response = self._answer_modbus(request) if is_modbus else self._answer(peer, request)
+        except Exception as error:  # The controller outlives a request of one client that it does not expect.
+            self._log_failure(request, error)
+            if is_modbus:
+                response = encode_modbus_response(request, refuse_modbus(request.payload, ModbusException.DEVICE))
+            else:
+                reply = Reply(refused_payload(request.function), is_invalid=True)
+                response = encode_response(request, self._status(reply), reply.payload)
         self._link.send_frame(peer, response)
 
     def receive_datagram(self, datagram: bytes) -> bool:
@@ -149,18 +155,24 @@ class XArmServer:
         self.controller.set_state(4)
         return 0
 
+    def _answer_modbus(self, request: Frame) -> bytes:
+        return encode_modbus_response(request, answer_modbus(request.payload, self._registers))
+
+    def _answer(self, peer: Peer, request: Frame) -> bytes:
+        reply = self._handle(peer, request)
+        return encode_response(request, self._status(reply), reply.payload)
+
     def _handle(self, peer: Peer, request: Frame) -> Reply:
+        refuse = self._handlers.refuse
         if request.function not in _FUNCTIONS:
-            self.controller.warn(UfactoryWarning.UNKNOWN_COMMAND)
-            self._log_refusal(f"function {request.function}", "W13: it does not exist here")
-            return Reply()
+            refuse(f"function {request.function}", UfactoryWarning.UNKNOWN_COMMAND, "it does not exist here")
+            return Reply(refused_payload(request.function))
         function = Function(request.function)
         try:
             values = decode_payload(function, request.payload)
         except DecodeError as error:
-            self.controller.warn(UfactoryWarning.PARAMETER)
-            self._log_refusal(function.name, f"W12: {error.problem}")
-            return Reply(is_invalid=True)
+            refuse(function.name, UfactoryWarning.PARAMETER, error.problem)
+            return Reply(refused_payload(function), is_invalid=True)
         return self._handlers.handle(peer, request, function, values)
 
     def _status(self, reply: Reply) -> int:
@@ -182,6 +194,12 @@ class XArmServer:
     def _log_refusal(self, name: str, reason: str) -> None:
         self._link.log("refused", f"{name} was refused: {reason}", request=name)
 
+    def _log_failure(self, request: Frame, error: Exception) -> None:
+        *_, place = extract_tb(error.__traceback__)
+        where = f"{Path(place.filename).name}, line {place.lineno}"
+        text = f"a request failed inside the controller ({type(error).__name__}: {error}; {where})"
+        self._link.log("warning", f"{text}; report it with these bytes: {request.function} {request.payload.hex(' ')}")
+
     def _log_state(self, before: State, after: State) -> None:
         if after is State.MOVING:
             self._link.log("motion_started", f"motion started in mode {self.controller.mode.value}")
@@ -202,4 +220,4 @@ def _report_channel(layout: ReportLayout, port: int) -> TcpChannel:
 
 def _socket_path(port: int) -> Path | None:
     """Returns where clients look for a Unix-domain socket; None for a port that they do not know."""
-    return Path(tempfile.gettempdir(), _SOCKET_NAME.format(port)) if port else None
+    return unix_socket_path(port) if port else None

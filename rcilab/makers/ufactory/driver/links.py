@@ -7,9 +7,7 @@ these, if they exist, whatever address it is given; so it may use them only wher
 from __future__ import annotations
 
 import socket
-import tempfile
 import time
-from pathlib import Path
 from struct import Struct
 from typing import NamedTuple
 
@@ -20,6 +18,7 @@ from rcilab.makers.ufactory.robots import ROBOTS
 from rcilab.makers.ufactory.wire.frame import PRIVATE, FrameReader, decode_frame
 from rcilab.makers.ufactory.wire.functions import Function
 from rcilab.makers.ufactory.wire.identity import IDENTITIES
+from rcilab.makers.ufactory.wire.unix_sockets import unix_socket_path
 
 _REQUEST = Struct(">HHHB")
 
@@ -43,7 +42,7 @@ class Endpoint(NamedTuple):
         link = socket.socket(socket.AF_UNIX)
         try:
             link.settimeout(timeout)
-            link.connect(str(_socket_path(port)))
+            link.connect(str(unix_socket_path(port)))
         except OSError:
             link.close()
             raise
@@ -67,7 +66,7 @@ def find_arm(address: XArmAddress, timeout: float) -> tuple[str, Endpoint]:
         try:
             link = endpoint.connect(address.port, timeout)
         except ConnectionRefusedError:
-            if not (address.is_here and _socket_path(address.port).exists()):
+            if not (address.is_here and unix_socket_path(address.port).exists()):
                 raise
             endpoint = endpoint._replace(is_local=True)
             link = endpoint.connect(address.port, timeout)
@@ -113,8 +112,3 @@ def _name_of(version: str, address: XArmAddress) -> str:
         f"the controller at {address} has an arm that rcilab does not know ({version!r}: axes, type, serial numbers, "
         f"firmware); it drives {', '.join(ROBOTS)}"
     )
-
-
-def _socket_path(port: int) -> Path:
-    """Returns where clients look for the Unix-domain socket of a port."""
-    return Path(tempfile.gettempdir(), f"xarmcontroller_uds_{port}")

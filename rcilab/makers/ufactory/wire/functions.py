@@ -11,7 +11,7 @@ from enum import IntEnum
 from struct import Struct
 from typing import Any
 
-from rcilab.core.errors import DecodeError
+from rcilab.core.errors import DecodeError, InvalidValueError
 
 
 class Function(IntEnum):
@@ -71,6 +71,7 @@ class Function(IntEnum):
     SET_FENCE = 59
     SET_COLLISION_REBOUND = 60
     SET_APPROXIMATE = 66
+    GET_DH = 67
     GET_MOVEMENT = 69
     SET_REPORT_CURRENT = 70
     SET_WORLD_OFFSET = 73
@@ -114,8 +115,13 @@ class Function(IntEnum):
     TOOL_OUTPUT_AT_POSITION = 145
     SET_IO_RESET = 146
     ANALOG_AT_POSITION = 147
+    GET_FORCE_OF_OLD_FIRMWARE = 150
+    GET_FORCE = 200
+    GET_FORCE_MODE = 203
+    GET_FORCE_CONFIGURATION = 212
     SET_COMMON_PARAMETER = 232
     GET_COMMON_PARAMETER = 233
+    GET_COMMON_INFORMATION = 234
     CHECK_FEEDBACK = 253
     SET_FEEDBACK = 254
 
@@ -192,6 +198,7 @@ _LAYOUTS: dict[Function, tuple[str, ...]] = {
     Function.ANALOG_AT_POSITION: (">BH|<4f",),
     Function.SET_COMMON_PARAMETER: ("<Bf",),
     Function.GET_COMMON_PARAMETER: ("B",),
+    Function.GET_COMMON_INFORMATION: ("B",),
     Function.SET_FEEDBACK: ("B",),
 }
 
@@ -241,7 +248,14 @@ def decode_payload(function: Function, payload: bytes) -> tuple[Any, ...]:
 
 
 def encode_values(code: str, *values: float) -> bytes:
-    """Returns numbers of one type: "f" little-endian floats, "B" bytes, "H", "h" and "i" big-endian integers."""
+    """Returns numbers of one type: "f" little-endian floats, "B" bytes, "H", "h" and "i" big-endian integers.
+
+    Raises:
+        InvalidValueError: A number is beyond the range of single precision.
+    """
     if code == "f":
-        return Struct(f"<{len(values)}f").pack(*values)
+        try:
+            return Struct(f"<{len(values)}f").pack(*values)
+        except OverflowError:
+            raise InvalidValueError("answer", list(values), "is beyond single precision") from None
     return Struct(f">{len(values)}{code}").pack(*(int(value) for value in values))

@@ -20,6 +20,7 @@ class ModbusException(IntEnum):
     FUNCTION = 1
     ADDRESS = 2
     DATA = 3
+    DEVICE = 4
 
 
 class ModbusError(Exception):
@@ -76,9 +77,14 @@ def answer_modbus(pdu: bytes, memory: ModbusMemory) -> bytes:
             raise ModbusError(ModbusException.FUNCTION)
         return bytes([function]) + handler(pdu[1:], memory)
     except error:  # Too short for its function.
-        return bytes([function | 0x80, ModbusException.DATA])
+        return refuse_modbus(pdu, ModbusException.DATA)
     except ModbusError as refusal:
-        return bytes([function | 0x80, refusal.code])
+        return refuse_modbus(pdu, refusal.code)
+
+
+def refuse_modbus(pdu: bytes, code: ModbusException) -> bytes:
+    """Returns the response to a request that is refused."""
+    return bytes([(pdu[0] if pdu else 0) | 0x80, code])
 
 
 def _counted(data: bytes, most: int) -> tuple[int, int]:

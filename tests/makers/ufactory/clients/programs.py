@@ -9,11 +9,16 @@ import json
 import math
 import sys
 import time
+from inspect import signature
 from typing import Any
 
 from xarm.wrapper import XArmAPI
 
 Q6 = [0.2, -0.5, -0.8, 0.1, 1.1, 0.3]
+OTHERS = (
+    "get_initial_point", "get_mount_direction", "get_trajectories",  # Of UFACTORY Studio, at a port of its own.
+    "get_bio_gripper_g2_position",  # The library decodes the answer of a gripper that is not there.
+)  # fmt: skip
 DOWN = [-180.0, 0.0, 0.0]
 SERVO_PERIOD = 0.004  # [s]
 
@@ -73,6 +78,27 @@ def properties(host: str) -> object:
         "volts": arm.voltages[0],
         "warm": arm.temperatures[0],
     }
+
+
+def getters(host: str) -> object:
+    """Returns what every getter without arguments raised, by its name, and the number of getters."""
+    arm = connect(host)
+    wait(lambda: arm.get_servo_angle()[0] == 0)
+    raised, names = {}, []
+    for name in dir(type(arm)):
+        if not name.startswith("get_") or name in OTHERS:
+            continue
+        required = [
+            x for x in list(signature(getattr(type(arm), name)).parameters.values())[1:]
+            if x.default is x.empty and x.kind is not x.VAR_KEYWORD
+        ]  # fmt: skip
+        if not required:
+            names.append(name)
+            try:
+                getattr(arm, name)()
+            except Exception as error:
+                raised[name] = repr(error)
+    return {"raised": raised, "count": len(names)}
 
 
 def joints(host: str) -> object:

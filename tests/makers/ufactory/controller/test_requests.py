@@ -68,6 +68,21 @@ def test_unnamed_axes_keep_their_value_at_the_end_of_the_queue(arm: Arm) -> None
     np.testing.assert_allclose(arm.q, (q[0], q[1] - 0.1, *q[2:]), atol=1e-6)
 
 
+def test_unnamed_parts_of_a_rotation_vector_keep_the_orientation(arm: Arm) -> None:
+    x, y, z = arm.pose[:3]
+    turned = pose_from_mm_rpy(arm.pose) @ pose_from_mm_rotation((0.0, 0.0, 0.0, 0.3, -0.4, 0.5))
+    arm.move_line((x, y, z, *pose_as_mm_rpy(turned)[3:]))
+    arm.run()
+    arm.call(Function.MOVE_LINE_AXIS_ANGLE, "9f2B", UNNAMED, y + 20.0, *(UNNAMED,) * 4, *SPEEDS, 0, 0)
+    arm.run()
+    np.testing.assert_allclose(arm.pose[:3], (x, y + 20.0, z), atol=1e-2)
+    np.testing.assert_allclose(pose_from_mm_rpy(arm.pose).rotation, turned.rotation, atol=1e-5)
+    arm.call(Function.MOVE_LINE, "10f3B", *(UNNAMED,) * 2, z + 20.0, *(UNNAMED,) * 3, *SPEEDS, -1.0, 0, 1, 0)
+    arm.run()
+    np.testing.assert_allclose(arm.pose[:3], (x, y + 20.0, z + 20.0), atol=1e-2)
+    np.testing.assert_allclose(pose_from_mm_rpy(arm.pose).rotation, turned.rotation, atol=1e-5)
+
+
 def test_relative_motions_refer_to_the_end_of_the_queue(arm: Arm) -> None:
     x, y, z, *rpy = arm.pose
     step = (0.0, 20.0, -10.0, 0.0, 0.0, 0.0, 0.0)
