@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import PlanningError
 from rcilab.core.limits import JointLimits
 from rcilab.motion import _ruckig
 from rcilab.motion.piecewise import PiecewisePolynomial
@@ -91,11 +92,19 @@ class JointMover:
         """Moves to these joint angles from the next step on, n finite numbers, [rad].
 
         Where a joint would leave its range along the path, all stop first.
+
+        Raises:
+            PlanningError: No curve leads there from the present state; the last goal stays.
         """
         state = self.state
+        before = self._goal, self._speed
         self._goal, self._speed = list(q), speed
+        try:
+            self._plan(state)
+        except PlanningError:
+            self._goal, self._speed = before
+            raise
         self._stop = None
-        self._plan(state)
         assert self._curve is not None
         (lowest, _), (highest, _) = self._curve.extremes()
         limits = self._limits

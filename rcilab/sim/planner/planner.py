@@ -203,16 +203,19 @@ class Planner:
 
         Raises:
             InvalidValueError: q is not n finite numbers.
+            PlanningError: No curve leads there from the running state; the motion in progress continues.
         """
         goal = as_vector(q, self._arm.model.n, "q", "rad").tolist()
         _require_speed(speed, self._arm.model.n)
         refusal = self._outside(goal)
         if refusal is None:
             mover = self._mover
-            if not isinstance(mover, JointMover):
+            if isinstance(mover, JointMover):
+                mover.set_goal(goal, speed)
+            else:
                 mover = JointMover(self._arm.limits.joint, self._running_state())
+                mover.set_goal(goal, speed)
                 self._take_over(mover)
-            mover.set_goal(goal, speed)
         return refusal
 
     def move_tool(self, pose: Pose, speed: ToolSpeed = _FASTEST_TOOL) -> Refusal | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from rcilab.core.errors import InvalidValueError, KinematicsError
+from rcilab.core.errors import InvalidValueError, KinematicsError, PlanningError
 from rcilab.core.spatial import Pose
 from rcilab.makers.ufactory.controller.information_requests import INFORMATION_HANDLERS
 from rcilab.makers.ufactory.controller.io_requests import IO_HANDLERS, IoRequests
@@ -102,7 +102,7 @@ class RequestHandlers:
         except InvalidValueError:
             self._tasks.drop(number)
             raise
-        except KinematicsError as error:
+        except (KinematicsError, PlanningError) as error:
             self._tasks.drop(number)
             controller.refuse(refusal_of(error, 1.0))
             return Reply()

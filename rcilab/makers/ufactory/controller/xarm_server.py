@@ -165,7 +165,7 @@ class XArmServer:
     def _handle(self, peer: Peer, request: Frame) -> Reply:
         refuse = self._handlers.refuse
         if request.function not in _FUNCTIONS:
-            refuse(f"function {request.function}", UfactoryWarning.UNKNOWN_COMMAND, "it does not exist here")
+            refuse(f"function {request.function}", UfactoryWarning.UNKNOWN_COMMAND, "it is not simulated")
             return Reply(refused_payload(request.function))
         function = Function(request.function)
         try:

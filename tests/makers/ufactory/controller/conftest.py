@@ -97,6 +97,7 @@ class Arm:
         self.call(Function.CLEAN_ERROR)
         self.call(Function.CLEAN_WARNING)
         self.call(Function.MOTION_ENABLE, "2B", ALL, 1)
+        self.call(Function.SET_STATE, "B", 4)
         self.run()
         self.call(Function.SET_MODE, "2B", mode, 0)
         assert self.call(Function.SET_STATE, "B", 0)[0] == 0

@@ -43,8 +43,9 @@ def test_every_reachable_pose_has_joint_angles_from_the_zero_pose(model: str) ->
 @pytest.mark.parametrize("model", MODELS)
 def test_a_pose_has_the_reference_angles_even_where_it_is_singular(model: str) -> None:
     arm = Arm(model)
-    pose = arm.pose
-    status, payload = arm.call(Function.GET_IK, "6f", *pose)
+    zeros = (0.0,) * 7
+    pose = floats(arm.call(Function.GET_FK, "7f", *zeros)[1])
+    status, payload = arm.call(Function.GET_IK, "6fB7f", *pose, 1, *zeros)
     assert status & 0x08 == 0
     np.testing.assert_allclose(floats(payload), 0.0, atol=1e-6)
 

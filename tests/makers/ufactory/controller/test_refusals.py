@@ -33,7 +33,7 @@ BOARD, GRIPPER = 9, 8
         (Function.TOOL_READ_32, ">BH", (GRIPPER, 0x9999), 4),
         (Function.GET_COMMON_PARAMETER, "B", (7,), 56),
         (Function.GET_COMMON_INFORMATION, "B", (99,), 4),
-        (Function.GET_POSE_OFFSET, "12f2B", ((HUGE,) * 3 + (0.5,) * 3) * 2 + (0, 0), 24),
+        (Function.GET_POSE_OFFSET, "12f2B", (HUGE,) * 3 + (0.5,) * 3 + (-HUGE,) * 3 + (0.5,) * 3 + (0, 0), 24),
         (Function.GET_FK, "7f", (nan,) * 7, 24),
         (Function.GET_IK, "6f", (nan,) * 6, 28),
         (Function.GET_IK, "6fB7f", (300.0, 0.0, 200.0, 3.0, 0.0, 0.0, 1, *(nan,) * 7), 28),
