@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rcilab.core.errors import InvalidValueError
+from rcilab.makers.ufactory.controller.modes import Mode
 from rcilab.makers.ufactory.errors import UfactoryWarning
 from rcilab.makers.ufactory.wire.functions import Function
 from rcilab.makers.ufactory.wire.reports import REPORTS
@@ -129,3 +130,13 @@ def test_functions_that_do_not_exist_here_are_answered_in_full(arm: Arm) -> None
         arm.call(Function.CLEAN_WARNING)
         assert arm.call(function) == (WARNING, bytes(size))
         assert f"function {function} was refused: W13, " in arm.link.logged[-1]
+
+
+def test_an_on_line_target_without_a_curve_is_an_error(arm: Arm) -> None:
+    arm.ready(Mode.JOINT_ONLINE)
+    arm.call(Function.MOVE_JOINT, "10f", Q6[0] + 1.0, *Q6[1:], 0.0, 2.0, 20.0, 0.0)
+    arm.step(100)
+    arm.call(Function.MOVE_JOINT, "10f", Q6[0] - 1.0, *Q6[1:], 0.0, 2.0, 1e-30, 0.0)
+    assert arm.error[0] == 25
+    arm.run()
+    assert arm.state == 4
