@@ -322,7 +322,7 @@ class Monitor:
 def _in_order(rows: Iterable[Condition], order: Iterable[Condition]) -> list[Condition]:
     """Returns common rows in their order, those of the arm's table on the same quantity in place of them.
 
-    A table may have its own name for a row, such as Franka's for the elbow.
+    A table may have its own name for a row, such as a maker's for the elbow.
     """
     own = {(row.signal, row.order): row for row in rows if row.stage == "throughout" and not row.is_measured}
     return [own.get((row.signal, row.order), row) for row in order]
