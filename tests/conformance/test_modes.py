@@ -29,9 +29,9 @@ from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import Motion, plan_arc, plan_circle, plan_joint, plan_line
-from tests.arms import REPRESENTATIVE
+from tests.arms import STREAMED
 
-MODELS = {name: load_model(name) for name in REPRESENTATIVE}
+MODELS = {name: load_model(name) for name in (*STREAMED, "RM65")}
 MODEL, PANDA = MODELS["xMatePro7"], MODELS["Panda"]
 FRANKA = ("FR3", "Panda")
 NEAR = 1e-4

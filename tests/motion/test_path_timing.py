@@ -18,10 +18,9 @@ from rcilab.motion import path_timing as along
 from rcilab.motion import plan_arc, plan_circle, plan_line, plan_nullspace
 from rcilab.motion.path import build_arc, build_line
 from rcilab.motion.time_parametrization import FastestLaw
-from tests.arms import REPRESENTATIVE
+from tests.arms import STREAMED
 
-ARMS = [name for name in REPRESENTATIVE if name != "xArm6"]  # Its jerk is up to 7 % too high between two rows.
-MODELS = {name: load_model(name, tool=Pose((0.0, 0.02, 0.1))) for name in ARMS}
+MODELS = {name: load_model(name, tool=Pose((0.0, 0.02, 0.1))) for name in STREAMED}
 SEVEN = MODELS["xMatePro7"]
 names, seeds, speeds = st.sampled_from(sorted(MODELS)), st.integers(0, 2**32), st.sampled_from([1.0, 0.5, 0.2])
 SOME = settings(max_examples=20)
