@@ -20,7 +20,7 @@ def test_every_plot_has_numbers_to_both_sides_that_do_not_touch(bound, height, i
     assert len(ticks) >= 2
     assert ticks[0] < 0.0 or not is_signed
     assert ticks[-1] > 0.0
-    assert all(low <= tick <= bound * (1 + 1e-9) for tick in ticks)
+    assert all(low - 1e-9 * bound <= tick <= bound * (1 + 1e-9) for tick in ticks)
     closest = min(b - a for a, b in itertools.pairwise(ticks))
     assert closest * height / (bound - low) >= 11.0  # [px] Of the font.
 
