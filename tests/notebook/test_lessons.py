@@ -115,8 +115,8 @@ def shown(notebook: nbformat.NotebookNode, kind: str) -> list[str]:
     ]
 
 
-def test_there_are_thirteen_lessons_in_two_languages() -> None:
-    assert [path.name[:3] for path in LESSONS] == [f"{number:02}_" for number in range(1, 14)]
+def test_there_are_fourteen_lessons_in_two_languages() -> None:
+    assert [path.name[:3] for path in LESSONS] == [f"{number:02}_" for number in range(1, 15)]
     assert [path.name for path in CHINESE] == [path.name.replace(".ipynb", ".zh.ipynb") for path in LESSONS]
 
 
@@ -217,13 +217,35 @@ def test_the_lesson_on_modes_shows_what_each_mode_refuses_and_what_ends_the_queu
     assert "error 21 - " in said
 
 
-@pytest.mark.parametrize("path", LESSONS[10:12], ids=lambda path: path.stem)
-def test_a_lesson_on_two_makers_runs_without_the_libraries_of_franka(path: Path) -> None:
+@pytest.mark.skipif(sys.version_info >= (3, 13), reason="pylibfranka has no wheel for this Python")
+def test_the_lesson_on_four_makers_shows_who_refuses_and_moves_an_arm_of_each() -> None:
+    said = printed(run_lesson(LESSONS[13]))
+    names = ["xMatePro7", "FR3", "xArm7", "RM75"]
+    assert re.findall(r"^(\w+) +(\w+)://\S+$", said, re.MULTILINE) == list(
+        zip(names, ("rci", "fci", "xarm", "realman"), strict=True)
+    )
+    assert re.findall(r"^(\w+) +(\S+), joint \d: .* of .*: (\S+)", said, re.MULTILINE) == [
+        ("FR3", "joint.acceleration", "joint_motion_generator_velocity_discontinuity"),
+        ("xArm7", "joint.jerk", "C25"),
+        ("RM75", "joint.acceleration", "0x100A"),
+    ]
+    assert re.findall(r"^FR3 +stopped at t = 0\.0\d\d s: (\w+)$", said, re.MULTILINE)
+    assert re.findall(r"^RM75 +stopped at t = \S+ s: (\w+)", said, re.MULTILINE) == ["0x4000"]
+    assert re.findall(r"^(\w+) +arrived at t = \S+ s", said, re.MULTILINE) == names
+
+
+@pytest.mark.parametrize(
+    ("path", "extras"),
+    [(LESSONS[10], ["franka"]), (LESSONS[11], ["franka"]), (LESSONS[13], ["franka", "xarm", "realman"])],
+    ids=lambda value: getattr(value, "stem", ""),
+)
+def test_a_lesson_on_several_makers_runs_without_their_libraries(path: Path, extras: list[str]) -> None:
     import nbformat
 
     notebook = with_solved_exercises(path)
-    missing = "import sys\nsys.modules.update({'panda_py': None, 'panda_py.libfranka': None, 'pylibfranka': None})"
+    libraries = ("panda_py", "panda_py.libfranka", "pylibfranka", "xarm", "xarm.wrapper", "Robotic_Arm")
+    missing = f"import sys\nsys.modules.update(dict.fromkeys({libraries}))"
     notebook.cells.insert(0, nbformat.v4.new_code_cell(missing))
     said = printed(execute(notebook, path))
-    assert said.count("pip install 'rcilab[franka]'") == 1
+    assert re.findall(r"pip install 'rcilab\[(\w+)\]'", said) == extras
     assert re.findall("✗ not yet|✓ right", said) == ["✗ not yet", "✓ right"] * EXERCISES
