@@ -11,8 +11,9 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.motion.hermite import State, quintic
 from rcilab.motion.time_parametrization import TimeParametrization
 
-_CHECKED_FRACTIONS = (0.25, 0.5, 0.75)
-"""Instants of a cycle at which the curve is checked besides its start, in cycles."""
+_CHECKED_FRACTIONS = (0.25, 0.5, 0.75, 1.0)
+"""Instants of a cycle at which the curve is checked besides its start, in cycles. Its end is not the start of the next
+one: where the path's third derivative jumps within a cycle, as at the via orientation of an arc, so does the jerk."""
 
 
 def cycle_quintics(path: State, law: TimeParametrization, rows: slice) -> list[Array]:

@@ -15,8 +15,11 @@ DIFFERENCE_STEP = 3e-4
 """Step of the finite differences, as a share of a path. Tuning value: the errors of both orders are below 1e-7."""
 
 
-def central_state(before: Array, here: Array, after: Array, *, step: float = DIFFERENCE_STEP) -> State:
-    """Returns the state at `here` from the values one step before and after it, by central differences."""
+def central_state(before: Array, here: Array, after: Array, *, step: float | Array = DIFFERENCE_STEP) -> State:
+    """Returns the state at `here` from the values one step before and after it, by central differences.
+
+    The step is a number, or an array that broadcasts with the values.
+    """
     return here, (after - before) / (2.0 * step), (after - 2.0 * here + before) / step**2
 
 

@@ -29,9 +29,9 @@ from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import Motion, plan_arc, plan_circle, plan_joint, plan_line
-from tests.arms import STREAMED
+from tests.arms import REPRESENTATIVE
 
-MODELS = {name: load_model(name) for name in (*STREAMED, "RM65")}
+MODELS = {name: load_model(name) for name in REPRESENTATIVE}
 MODEL, PANDA = MODELS["xMatePro7"], MODELS["Panda"]
 FRANKA = ("FR3", "Panda")
 NEAR = 1e-4
@@ -236,6 +236,7 @@ def test_a_spoiled_pose_is_flagged_in_exactly_its_differences(name, what, seed, 
     axis /= np.linalg.norm(axis)
     size, row = SPOILS[what]
     if what == "translation":
+        size = max(size, 1.2 * model.limits.cartesian.translation_acceleration * CYCLE_TIME**2)
         spoiled_pose = Pose(T.position + size * axis, T.wxyz)
     elif what == "rotation":
         spoiled_pose = T @ Pose.from_rpy(np.zeros(3), size * axis)

@@ -18,9 +18,9 @@ from rcilab.motion import path_timing as along
 from rcilab.motion import plan_arc, plan_circle, plan_line, plan_nullspace
 from rcilab.motion.path import build_arc, build_line
 from rcilab.motion.time_parametrization import FastestLaw
-from tests.arms import STREAMED
+from tests.arms import REPRESENTATIVE
 
-MODELS = {name: load_model(name, tool=Pose((0.0, 0.02, 0.1))) for name in STREAMED}
+MODELS = {name: load_model(name, tool=Pose((0.0, 0.02, 0.1))) for name in REPRESENTATIVE}
 SEVEN = MODELS["xMatePro7"]
 names, seeds, speeds = st.sampled_from(sorted(MODELS)), st.integers(0, 2**32), st.sampled_from([1.0, 0.5, 0.2])
 SOME = settings(max_examples=20)
@@ -58,7 +58,7 @@ def require_allowed(model, motion, speed):
         assert monitor.step(model.forward(q), angles(model, q)) == [], monitor.violations()
     times = np.linspace(0.0, motion.duration, 7 * len(motion))
     joint = model.limits.joint
-    # The planner does not check the jerk at the very end of a cycle, where that of the next one begins.
+    # The planner checks the jerk at five instants of a cycle.
     for order, bound in ((1, speed * joint.velocity), (2, speed * joint.acceleration), (3, 1.01 * joint.jerk)):
         assert (np.abs(motion.polynomial.sample(times, order)) < bound).all()
     assert ((joint.lower < motion.q) & (motion.q < joint.upper)).all()
@@ -100,6 +100,7 @@ def test_a_line_is_straight_allowed_smooth_and_exact_at_its_ends(name, seed, spe
 @SOME
 @given(names, seeds, speeds)
 @example("xMatePro3", 9108064, 1.0)  # It ends below the floor.
+@example("xArm6", 80, 1.0)  # The jerk jumps where the tool passes via.
 def test_an_arc_is_round_allowed_and_smooth(name, seed, speed):
     model = MODELS[name]
     q, via, goal, psi = ends(model, seed, 0.4)
@@ -131,6 +132,7 @@ def test_in_the_null_space_the_tool_stands_and_the_arm_angle_arrives(name, seed,
 
 @SOME
 @given(names, st.floats(0.3, math.tau), st.floats(0.03, 0.15), speeds, st.sampled_from(["held", "turning"]))
+@example("FR3", 2.0, 0.125, 0.2, "turning")  # More rows than are computed together.
 def test_a_circle_comes_back_or_goes_as_far_as_told(name, angle, radius, speed, orientation):
     model = MODELS[name]
     T = model.forward(model.home)
@@ -152,6 +154,8 @@ def test_a_circle_comes_back_or_goes_as_far_as_told(name, angle, radius, speed, 
 
 @SOME
 @given(names, seeds, st.sampled_from([0.3, 0.1]), st.sampled_from(["line", "arc", "circle", "elbow"]))
+@example("FR3", 1405, 0.3, "arc")  # Joint 5 turns fast close to a singular pose.
+@example("RM65", 22, 0.3, "arc")
 def test_the_s_profile_is_as_smooth_and_between_the_cycles_not_faster_than_at_them(name, seed, speed, kind):
     model = MODELS[name]
     q, via, goal, psi = ends(model, seed, 0.4)
@@ -171,7 +175,11 @@ def test_the_s_profile_is_as_smooth_and_between_the_cycles_not_faster_than_at_th
     joint = model.limits.joint
     for order, rows, limit in ((1, motion.dq, joint.velocity), (2, motion.ddq, joint.acceleration)):
         between = np.abs(motion.polynomial.sample(times, order)) / limit
-        assert (between.max(axis=0) <= 1.001 * (np.abs(rows) / limit).max(axis=0) + 1e-4).all()
+        highest = (np.abs(rows) / limit).max(axis=0)
+        if kind == "arc":  # The jerk jumps at via, where the path's acceleration may thus peak between two rows.
+            near = int(np.linalg.norm(model.forward_path(motion.q)[:, :3, 3] - via.position, axis=1).argmin())
+            highest += np.abs(np.diff(rows[max(near - 2, 0) : near + 3], axis=0)).max(axis=0) / (2.0 * limit)
+        assert (between.max(axis=0) <= 1.001 * highest + 1e-4).all()
     assume(check(motion, model).ok)
     assert (np.abs(motion.polynomial.sample(times, 3)) < joint.jerk).all()
 
