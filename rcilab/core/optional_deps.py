@@ -28,14 +28,19 @@ class MissingExtraError(UsageError):
         self.library = library
 
 
-def require_installed(library: str, purpose: str) -> None:
-    """Checks that a library of the extra `lab` is installed, without importing it.
+def require_installed(library: str, purpose: str, extra: Extra = "lab") -> None:
+    """Checks that a library of an extra is installed, without importing it.
+
+    Args:
+        library: Name of the module.
+        purpose: The feature that needs it.
+        extra: The extra that contains it.
 
     Raises:
         MissingExtraError: The library is not installed.
     """
     if find_spec(library) is None:
-        raise MissingExtraError(library, purpose, "lab")
+        raise MissingExtraError(library, purpose, extra)
 
 
 def require_library(name: str, purpose: str, extra: Extra = "export") -> Any:

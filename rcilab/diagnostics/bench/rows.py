@@ -61,6 +61,7 @@ ROWS = MappingProxyType(
         "xarm_answer": "ufactory",
         "xarm_reports": "ufactory",
         "xarm_connect": "ufactory",
+        "four_makers": "four_makers",
         "watching": "record",
         "control_loop": "page",
         "spectators": "viewer_load",
