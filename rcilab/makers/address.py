@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from ipaddress import AddressValueError, IPv4Address
 from typing import NamedTuple
 from urllib.parse import parse_qsl, urlsplit
@@ -59,6 +60,53 @@ def split_address(text: str, scheme: str, example: str, known: tuple[str, ...]) 
             raise InvalidValueError("address", text, f"has the unknown option {name}; known: {', '.join(known)}")
         options[name] = _port(text, name, value)
     return AddressParts(parts.hostname, None if port is None else _port(text, "port", str(port)), options)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControllerAddress:
+    """A parsed `SCHEME://HOST:PORT[?world_port=W]`: all of an address whose other ports clients find themselves."""
+
+    scheme: str
+    host: str
+    port: int
+    """TCP port of the controller."""
+    world_port: int | None = None
+    """Simulation port of a virtual controller; None: unknown, or a real robot."""
+
+    @property
+    def is_here(self) -> bool:
+        """Whether it is a loopback address: a virtual controller on this machine."""
+        return is_loopback(self.host)
+
+    def __str__(self) -> str:
+        option = "" if self.world_port is None else f"?world_port={self.world_port}"
+        return f"{self.scheme}://{self.host}:{self.port}{option}"
+
+
+def parse_controller_address(
+    text: str, *, scheme: str, port: int, example: str, ignored: tuple[str, ...] = (), is_port_fixed: bool = False
+) -> ControllerAddress:
+    """Returns the parts of an address whose only option of use is the simulation port.
+
+    Args:
+        text: The address; everything but the host may be left out.
+        scheme: The scheme it must have, if it has one.
+        port: TCP port of the controller, where the address has none.
+        example: A valid address, for errors.
+        ignored: Options with ports that a virtual controller prints and clients find by themselves.
+        is_port_fixed: Whether clients of the interface connect to that port only.
+
+    Raises:
+        InvalidValueError: It is not such an address; the message names the wrong part.
+    """
+    parts = split_address(text, scheme, example, ("world_port", *ignored))
+    if is_port_fixed and parts.port not in (None, port):
+        raise InvalidValueError(
+            "address", text, f"has port {parts.port}: clients of this interface connect to {port} only; leave it out"
+        )
+    return ControllerAddress(
+        scheme=scheme, host=parts.host, port=parts.port or port, world_port=parts.options.get("world_port")
+    )
 
 
 def is_loopback(host: str) -> bool:

@@ -84,6 +84,12 @@ class BenchPage:
             self.open_tab("Jog")
         self.wait(lambda: self.alerts() == [], "no complaint of an earlier test")
 
+    def wait_for_arm(self, name: str) -> None:
+        """Waits until an arm that was chosen is ready and in the scene."""
+        self.wait(lambda: self.state.model.name == name, "the other model", 30)
+        self.wait(lambda: self.status.phase == "idle" and bool(self.status.powered), "a ready arm", 30)
+        self.wait(lambda: self.shows("live", self.status.q), "the arm in the scene", 30)
+
     def open_tab(self, name: str) -> None:
         self.tab.get_by_role("tab", name=name).click()
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from browser.test_settings import choose
+from browser.other_arm import switch_arm
 from rcilab.app.goal.goal_actions import SetSpeed
-from rcilab.app.run.run_actions import ChooseRobot
 from rcilab.app.view_actions import SetView
 
 pytest.importorskip("pylibfranka", reason="the extra franka is not installed")
@@ -16,20 +15,7 @@ pytest.importorskip("pylibfranka", reason="the extra franka is not installed")
 @pytest.fixture(scope="module")
 def switched(opened):
     """The page with an FR3, chosen in its settings; afterwards with the arm of the other tests."""
-
-    def wait_for_arm(name: str) -> None:
-        opened.wait(lambda: opened.state.model.name == name, "the other model", 30)
-        opened.wait(lambda: opened.status.phase == "idle" and bool(opened.status.powered), "a ready arm", 30)
-        opened.wait(lambda: opened.shows("live", opened.status.q), "the arm in the scene", 30)
-
-    opened.start_afresh()
-    opened.open_tab("Settings")
-    choose(opened, "Robot", "Franka FR3")
-    wait_for_arm("FR3")
-    yield opened
-    opened.bench.dispatcher.ask(SetView(name="language", value="en"))
-    opened.bench.dispatcher.ask(ChooseRobot(model="xMatePro7"))
-    wait_for_arm("xMatePro7")
+    yield from switch_arm(opened, "Franka FR3")
 
 
 @pytest.fixture

@@ -13,8 +13,8 @@ from rcilab.makers.franka.robots import ROBOTS
 from rcilab.makers.maker import Capabilities, Timing
 
 if TYPE_CHECKING:
+    from rcilab.makers.address import ControllerAddress
     from rcilab.makers.driver import ExpectedArm
-    from rcilab.makers.franka.driver.address import FciAddress
     from rcilab.makers.franka.driver.fci_driver import FciDriver
     from rcilab.makers.parameters import ParameterGroup
     from rcilab.makers.scenario import FaultScenario
@@ -58,7 +58,7 @@ class Franka:
 
         return scenarios_of(model.name)
 
-    def parse_address(self, text: str) -> FciAddress:
+    def parse_address(self, text: str) -> ControllerAddress:
         """Returns the parts of an address, fci://HOST."""
         from rcilab.makers.franka.driver.address import parse_address
 

@@ -14,9 +14,9 @@ from rcilab.makers.realman.errors import RealManError
 from rcilab.makers.realman.robots import ROBOTS
 
 if TYPE_CHECKING:
+    from rcilab.makers.address import ControllerAddress
     from rcilab.makers.driver import ExpectedArm
     from rcilab.makers.parameters import ParameterGroup
-    from rcilab.makers.realman.driver.address import RealManAddress
     from rcilab.makers.realman.driver.realman_driver import RealManDriver
     from rcilab.makers.scenario import FaultScenario
     from rcilab.model.robot_model import RobotModel
@@ -63,7 +63,7 @@ class RealMan:
         """Returns none."""
         return ()
 
-    def parse_address(self, text: str) -> RealManAddress:
+    def parse_address(self, text: str) -> ControllerAddress:
         """Returns the parts of an address, realman://HOST:PORT."""
         from rcilab.makers.realman.driver.address import parse_address
 

@@ -19,10 +19,10 @@ from rcilab.makers.ufactory.errors import UfactoryError
 from rcilab.makers.ufactory.robots import ROBOTS
 
 if TYPE_CHECKING:
+    from rcilab.makers.address import ControllerAddress
     from rcilab.makers.driver import ExpectedArm
     from rcilab.makers.parameters import ParameterGroup
     from rcilab.makers.scenario import FaultScenario
-    from rcilab.makers.ufactory.driver.address import XArmAddress
     from rcilab.makers.ufactory.driver.xarm_driver import XArmDriver
     from rcilab.model.robot_model import RobotModel
     from rcilab.sim.controller_config import ControllerConfig
@@ -70,7 +70,7 @@ class Ufactory:
 
         return scenarios_of(model.name)
 
-    def parse_address(self, text: str) -> XArmAddress:
+    def parse_address(self, text: str) -> ControllerAddress:
         """Returns the parts of an address, xarm://HOST."""
         from rcilab.makers.ufactory.driver.address import parse_address
 

@@ -12,8 +12,8 @@ from typing import Any
 from rcilab.core.command import CartesianPosition, Command, JointPosition
 from rcilab.core.errors import CommandRejectedError, InvalidValueError
 from rcilab.core.state import ControllerMode, RobotMode
+from rcilab.makers.address import ControllerAddress
 from rcilab.makers.franka.bounds import SINGLE_PRECISION
-from rcilab.makers.franka.driver.address import FciAddress
 from rcilab.makers.franka.driver.client import FciClient, columns_of
 from rcilab.makers.franka.driver.libraries import load_client_library
 
@@ -36,7 +36,7 @@ class ActiveClient(FciClient):
     resolution = SINGLE_PRECISION
     commands_elbow = False  # The binding of CartesianPose has no elbow.
 
-    def __init__(self, address: FciAddress) -> None:
+    def __init__(self, address: ControllerAddress) -> None:
         library = load_client_library(VERSION)
         super().__init__(library, address, _STATE_SIZE)
         self._library = library

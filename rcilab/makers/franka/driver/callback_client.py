@@ -14,7 +14,7 @@ from typing import Any
 from rcilab.core.command import CartesianPosition, Command, JointPosition
 from rcilab.core.errors import ConnectionLostError
 from rcilab.core.state import ControllerMode
-from rcilab.makers.franka.driver.address import FciAddress
+from rcilab.makers.address import ControllerAddress
 from rcilab.makers.franka.driver.call_limit import CallLimit
 from rcilab.makers.franka.driver.client import ANSWER_TIMEOUT, FciClient, columns_of
 from rcilab.makers.franka.driver.libraries import load_client_library
@@ -40,7 +40,7 @@ class CallbackClient(FciClient):
     resolution = 0.0
     commands_elbow = True
 
-    def __init__(self, address: FciAddress) -> None:
+    def __init__(self, address: ControllerAddress) -> None:
         library = load_client_library(VERSION)
         super().__init__(library, address, _STATE_SIZE)
         self._library = library

@@ -14,7 +14,7 @@ from rcilab.core.command import Command
 from rcilab.core.errors import CommandRejectedError, RcilabError
 from rcilab.core.spatial import as_pose
 from rcilab.core.state import ControllerMode
-from rcilab.makers.franka.driver.address import FciAddress
+from rcilab.makers.address import ControllerAddress
 from rcilab.makers.franka.driver.client_sockets import open_with_sockets
 from rcilab.makers.franka.driver.libraries import kept_scheduling
 from rcilab.makers.franka.driver.state_reader import number_of
@@ -44,7 +44,7 @@ class FciClient(ABC):
     commands_elbow: bool
     """Whether poses can be sent with the elbow."""
 
-    def __init__(self, library: Any, address: FciAddress, state_size: int) -> None:
+    def __init__(self, library: Any, address: ControllerAddress, state_size: int) -> None:
         def open_robot() -> tuple[Any, Any]:
             robot = library.Robot(address.host, library.RealtimeConfig.kIgnore)
             state = robot.read_once()

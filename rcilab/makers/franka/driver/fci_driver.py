@@ -10,10 +10,11 @@ from rcilab.core.command import Command, CommandFilter
 from rcilab.core.errors import CommandRejectedError, InvalidValueError, ModelError
 from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
+from rcilab.makers.address import ControllerAddress
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ConfiguredArm, ExpectedArm, GuideKind, GuideSpace, RequestLock, SafetyStopReason
 from rcilab.makers.franka.driver.active_client import ActiveClient
-from rcilab.makers.franka.driver.address import FciAddress, parse_address
+from rcilab.makers.franka.driver.address import parse_address
 from rcilab.makers.franka.driver.callback_client import CallbackClient
 from rcilab.makers.franka.driver.client import FciClient
 from rcilab.makers.franka.driver.configuration import send_configuration
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
 _NEWEST = 10
 """Version that is asked for where the arm is not known."""
-_CLIENTS: dict[int, Callable[[FciAddress], FciClient]] = {5: CallbackClient, 10: ActiveClient}
+_CLIENTS: dict[int, Callable[[ControllerAddress], FciClient]] = {5: CallbackClient, 10: ActiveClient}
 _GENERATORS = {
     ControllerMode.JOINT_POSITION: MotionGeneratorMode.JOINT_POSITION,
     ControllerMode.JOINT_IMPEDANCE: MotionGeneratorMode.JOINT_POSITION,
@@ -80,7 +81,7 @@ class FciDriver:
     keeps_newest = reports_load = True
     recovery_silence = 10.0  # The library holds Python's global lock until the arm has recovered, which takes seconds.
 
-    def __init__(self, client: FciClient, address: FciAddress, arm_name: str) -> None:
+    def __init__(self, client: FciClient, address: ControllerAddress, arm_name: str) -> None:
         self.name = str(address)
         self.n = 7
         self.arm_name = arm_name

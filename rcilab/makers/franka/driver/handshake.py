@@ -12,14 +12,14 @@ from contextlib import suppress
 from struct import Struct
 
 from rcilab.core.errors import ConnectionLostError
-from rcilab.makers.franka.driver.address import FciAddress
+from rcilab.makers.address import ControllerAddress
 from rcilab.makers.network import find_route, no_robot_error
 
 _CONNECT = Struct("<IIIHH")
 _ANSWER = Struct("<IIIBH")
 
 
-def find_version(address: FciAddress, version: int, timeout: float) -> int:
+def find_version(address: ControllerAddress, version: int, timeout: float) -> int:
     """Returns the version of the interface at an address.
 
     Args:

@@ -8,8 +8,8 @@ import time
 import msgspec
 
 from rcilab.core.errors import ConnectionLostError, DecodeError, ModelError
+from rcilab.makers.address import ControllerAddress
 from rcilab.makers.network import HostRoute, find_route, no_robot_error
-from rcilab.makers.realman.driver.address import RealManAddress
 from rcilab.makers.realman.robots import ROBOTS
 from rcilab.makers.realman.wire.identity import arm_of_product
 from rcilab.makers.realman.wire.line import LineReader, encode_answer
@@ -20,7 +20,7 @@ _ADVICE = (
 )
 
 
-def find_arm(address: RealManAddress, timeout: float) -> tuple[str, HostRoute]:
+def find_arm(address: ControllerAddress, timeout: float) -> tuple[str, HostRoute]:
     """Returns the name of the arm at an address, and the route to its controller.
 
     Args:

@@ -10,13 +10,14 @@ from rcilab.core.errors import CommandRejectedError, ConnectionLostError, Deadli
 from rcilab.core.fault import name_faults
 from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, RobotMode, RobotState
+from rcilab.makers.address import ControllerAddress
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ConfiguredArm, ExpectedArm, GuideKind, GuideSpace, RequestLock, SafetyStopReason
 from rcilab.makers.fault_report import describe_faults
 from rcilab.makers.known_setup import with_reported_load, with_reported_tool
 from rcilab.makers.library_connection import LibraryDriver
 from rcilab.makers.realman.bounds import ANGLE_STEP
-from rcilab.makers.realman.driver.address import RealManAddress, parse_address
+from rcilab.makers.realman.driver.address import parse_address
 from rcilab.makers.realman.driver.client import RealManClient, load_client_library
 from rcilab.makers.realman.driver.configuration import send_configuration
 from rcilab.makers.realman.driver.connection import RealManConnection
@@ -89,7 +90,7 @@ class RealManDriver(LibraryDriver[NumberedPush]):
     keeps_newest = reports_load = True
     recovery_silence = 0.0
 
-    def __init__(self, connection: RealManConnection, address: RealManAddress, arm_name: str) -> None:
+    def __init__(self, connection: RealManConnection, address: ControllerAddress, arm_name: str) -> None:
         world_port = address.world_port
         super().__init__(connection, arm_name, None if world_port is None else (address.host, world_port))
         self.is_local = address.is_here

@@ -12,8 +12,8 @@ from struct import Struct
 from typing import NamedTuple
 
 from rcilab.core.errors import ConnectionLostError, DecodeError, ModelError
+from rcilab.makers.address import ControllerAddress
 from rcilab.makers.network import find_route, no_robot_error
-from rcilab.makers.ufactory.driver.address import XArmAddress
 from rcilab.makers.ufactory.robots import ROBOTS
 from rcilab.makers.ufactory.wire.frame import PRIVATE, FrameReader, decode_frame
 from rcilab.makers.ufactory.wire.functions import Function
@@ -49,7 +49,7 @@ class Endpoint(NamedTuple):
         return link
 
 
-def find_arm(address: XArmAddress, timeout: float) -> tuple[str, Endpoint]:
+def find_arm(address: ControllerAddress, timeout: float) -> tuple[str, Endpoint]:
     """Returns the name of the arm at an address, and where its controller listens.
 
     Args:
@@ -103,7 +103,7 @@ def _read_version(link: socket.socket) -> str:
                 return answer.payload[1:].partition(b"\0")[0].decode("ascii", "replace")
 
 
-def _name_of(version: str, address: XArmAddress) -> str:
+def _name_of(version: str, address: ControllerAddress) -> str:
     kind = tuple(version.split(",")[:2])
     for name, identity in IDENTITIES.items():
         if kind == (str(identity.axes), str(identity.type)) and name in ROBOTS:

@@ -8,13 +8,14 @@ from rcilab.core.command import Command, CommandFilter, JointPosition
 from rcilab.core.errors import DeadlineError, InvalidValueError, ModelError
 from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, RobotMode, RobotState
+from rcilab.makers.address import ControllerAddress
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ConfiguredArm, ExpectedArm, GuideKind, GuideSpace, RequestLock, SafetyStopReason
 from rcilab.makers.fault_report import describe_faults
 from rcilab.makers.known_setup import with_reported_load, with_reported_tool
 from rcilab.makers.library_connection import LibraryDriver
 from rcilab.makers.ufactory.bounds import SINGLE_PRECISION
-from rcilab.makers.ufactory.driver.address import XArmAddress, parse_address
+from rcilab.makers.ufactory.driver.address import parse_address
 from rcilab.makers.ufactory.driver.client import XArmClient, describe_error
 from rcilab.makers.ufactory.driver.configuration import send_configuration
 from rcilab.makers.ufactory.driver.connection import XArmConnection
@@ -78,7 +79,7 @@ class XArmDriver(LibraryDriver[bytes]):
     keeps_newest = reports_load = True
     recovery_silence = 0.0
 
-    def __init__(self, connection: XArmConnection, address: XArmAddress, arm_name: str) -> None:
+    def __init__(self, connection: XArmConnection, address: ControllerAddress, arm_name: str) -> None:
         world_port = address.world_port
         super().__init__(connection, arm_name, None if world_port is None else (address.host, world_port))
         self.is_local = address.is_here

@@ -19,8 +19,10 @@ from rcilab.core.command import JointPosition
 from rcilab.core.errors import ConnectionLostError, InvalidValueError, ModelError
 from rcilab.core.optional_deps import MissingExtraError
 from rcilab.execution.connect import connect
+from rcilab.makers.address import ControllerAddress
+from rcilab.makers.franka.driver import address as fci_address
 from rcilab.makers.franka.driver import libraries
-from rcilab.makers.franka.driver.address import FciAddress, parse_address
+from rcilab.makers.franka.driver.address import parse_address
 from rcilab.makers.franka.driver.handshake import find_version
 from rcilab.model.robot_model import load_model
 from tests.makers.franka.driver.conftest import ARMS, NO_LIBRARY
@@ -40,7 +42,7 @@ def served(controller, request) -> tuple[str, str]:
 
 
 def test_an_address_is_a_host():
-    assert parse_address("fci://172.16.0.2") == FciAddress(host="172.16.0.2")
+    assert parse_address("fci://172.16.0.2") == ControllerAddress(scheme="fci", host="172.16.0.2", port=1337)
     assert str(parse_address("172.16.0.2:1337?world_port=9")) == "fci://172.16.0.2:1337?world_port=9"
     assert parse_address("fci://127.0.0.2?hand_port=1338&udp_port=5").is_here
     with pytest.raises(InvalidValueError, match="has port 1338: clients of this interface connect to 1337 only"):
@@ -102,9 +104,9 @@ def test_the_scheme_of_another_maker_with_the_same_port_is_suggested(controller)
 
 
 @pytest.mark.parametrize("answer", [b"", b"\x00" * 5])
-def test_what_answers_there_and_is_no_controller_is_not_waited_for(monkeypatch, answer):
+def test_what_answers_there_and_is_no_controller_is_not_waited_for(answer):
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        monkeypatch.setattr(FciAddress, "port", listener.getsockname()[1])
+        address = ControllerAddress(scheme="fci", host="127.0.0.1", port=listener.getsockname()[1])
 
         def serve() -> None:
             peer, _ = listener.accept()
@@ -115,13 +117,13 @@ def test_what_answers_there_and_is_no_controller_is_not_waited_for(monkeypatch, 
         thread = threading.Thread(target=serve)
         thread.start()
         with pytest.raises(ConnectionLostError, match="ended the connection before its first answer"):
-            find_version(FciAddress(host="127.0.0.1"), 10, 2.0)
+            find_version(address, 10, 2.0)
         thread.join()
 
 
-def test_a_controller_that_answers_too_slowly_is_not_waited_for(monkeypatch):
+def test_a_controller_that_answers_too_slowly_is_not_waited_for():
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        monkeypatch.setattr(FciAddress, "port", listener.getsockname()[1])
+        address = ControllerAddress(scheme="fci", host="127.0.0.1", port=listener.getsockname()[1])
 
         def serve() -> None:
             peer, _ = listener.accept()
@@ -133,7 +135,7 @@ def test_a_controller_that_answers_too_slowly_is_not_waited_for(monkeypatch):
         thread = threading.Thread(target=serve)
         thread.start()
         with pytest.raises(ConnectionLostError, match=r"accepted the connection and did not answer within 0\.5 s"):
-            find_version(FciAddress(host="127.0.0.1"), 10, 0.5)
+            find_version(address, 10, 0.5)
         thread.join()
 
 
@@ -156,7 +158,7 @@ def test_states_that_do_not_arrive_are_a_matter_of_the_firewall(name):
 )
 def test_an_unknown_version_is_named(monkeypatch, version, sentence):
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        monkeypatch.setattr(FciAddress, "port", listener.getsockname()[1])
+        monkeypatch.setattr(fci_address, "CLIENT_PORT", listener.getsockname()[1])
 
         def serve() -> None:
             peer, _ = listener.accept()

@@ -18,7 +18,8 @@ from rcilab.core.errors import ConnectionLostError, InvalidValueError, ModelErro
 from rcilab.core.optional_deps import MissingExtraError
 from rcilab.core.spatial import Pose
 from rcilab.execution.connect import connect
-from rcilab.makers.realman.driver.address import RealManAddress, parse_address
+from rcilab.makers.address import ControllerAddress
+from rcilab.makers.realman.driver.address import parse_address
 from rcilab.makers.realman.driver.handshake import find_arm
 from rcilab.model.robot_model import load_model
 
@@ -33,7 +34,9 @@ def controller() -> Iterator[VirtualController]:
 
 
 def test_an_address_has_the_port_of_the_makers_clients_unless_another_is_given():
-    assert parse_address("realman://192.168.1.18") == RealManAddress(host="192.168.1.18", port=8080)
+    assert parse_address("realman://192.168.1.18") == ControllerAddress(
+        scheme="realman", host="192.168.1.18", port=8080
+    )
     assert str(parse_address("192.168.1.18:9090?world_port=9")) == "realman://192.168.1.18:9090?world_port=9"
     assert parse_address("realman://127.0.0.2:1?udp_port=5").is_here
     with pytest.raises(InvalidValueError, match="unknown option hand_port"):
@@ -113,7 +116,7 @@ def test_no_robot_at_an_address_names_what_to_check():
 )
 def test_what_answers_there_and_is_no_known_arm_is_named(answer, error, text):
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        address = RealManAddress(host="127.0.0.1", port=listener.getsockname()[1])
+        address = ControllerAddress(scheme="realman", host="127.0.0.1", port=listener.getsockname()[1])
 
         def serve() -> None:
             peer, _ = listener.accept()

@@ -17,8 +17,9 @@ from rcilab.core.command import JointPosition
 from rcilab.core.errors import ConnectionLostError, InvalidValueError, ModelError
 from rcilab.core.optional_deps import MissingExtraError
 from rcilab.execution.connect import connect
+from rcilab.makers.address import ControllerAddress
 from rcilab.makers.ufactory.driver import links
-from rcilab.makers.ufactory.driver.address import XArmAddress, parse_address
+from rcilab.makers.ufactory.driver.address import parse_address
 from rcilab.model.robot_model import load_model
 
 
@@ -30,7 +31,7 @@ def controller() -> Iterator[VirtualController]:
 
 
 def test_an_address_is_a_host():
-    assert parse_address("xarm://192.168.1.185") == XArmAddress(host="192.168.1.185")
+    assert parse_address("xarm://192.168.1.185") == ControllerAddress(scheme="xarm", host="192.168.1.185", port=502)
     assert str(parse_address("192.168.1.185:502?world_port=9")) == "xarm://192.168.1.185:502?world_port=9"
     assert parse_address("xarm://127.0.0.2").is_here
     with pytest.raises(InvalidValueError, match="has port 503: clients of this interface connect to 502 only"):
@@ -110,9 +111,9 @@ def test_no_robot_at_an_address_names_what_to_check():
         ),
     ],
 )
-def test_what_answers_there_and_is_no_known_arm_is_named(monkeypatch, answer, error, text):
+def test_what_answers_there_and_is_no_known_arm_is_named(answer, error, text):
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        monkeypatch.setattr(XArmAddress, "port", listener.getsockname()[1])
+        address = ControllerAddress(scheme="xarm", host="127.0.0.1", port=listener.getsockname()[1])
 
         def serve() -> None:
             peer, _ = listener.accept()
@@ -123,7 +124,7 @@ def test_what_answers_there_and_is_no_known_arm_is_named(monkeypatch, answer, er
         thread = threading.Thread(target=serve)
         thread.start()
         with pytest.raises(error, match=text):
-            links.find_arm(XArmAddress(host="127.0.0.1"), 2.0)
+            links.find_arm(address, 2.0)
         thread.join()
 
 
