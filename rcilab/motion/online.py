@@ -36,7 +36,8 @@ class Jog:
     joint that moves towards the end of its range stops `POSITION_MARGIN` inside it. A command that exceeds a limit is
     not an error: it is followed as far as the limits allow; see `part` and `is_damped`. Where an arm bounds its
     velocities near the ends of the ranges, a joint stops farther inside, and all accelerate less (`braking_limits`).
-    Where it bounds the tool's velocity (`Limits.joint_tool_velocity`), the joints are slower (`JointSpeedGovernor`).
+    Where it bounds the tool's velocity (`Limits.joint_tool_velocity`), the joints are slower (`JointSpeedGovernor`), so
+    that the tool keeps `TOOL_VELOCITY_PART` = 0.85 of the bound.
 
         jog = Jog(model, robot.state.q_c)
         jog.set_twist([0.05, 0, 0, 0, 0, 0], frame="tool")

@@ -14,6 +14,7 @@ from rcilab.motion.bounds import LIMIT_MARGIN
 from rcilab.motion.end_velocity import bounds_along
 from rcilab.motion.path_bounds import MIN_SLOPE, POLYGON_FACTOR, PathBounds, half_planes, path_bounds
 from rcilab.motion.segment_spline import SegmentSpline, knot_derivatives
+from rcilab.motion.tool_velocity import TOOL_VELOCITY_PART
 
 _STEP = 1e-6  # Of s, for differences.
 
@@ -76,7 +77,7 @@ def spline_bounds(spline: SegmentSpline, limits: ColumnLimits, model: RobotModel
         ends = np.clip([spline.knots - _STEP, spline.knots + _STEP], 0.0, spline.knots[-1])
         before, after = (model.position_path(spline.values(s, slice(n))) for s in ends)
         slope = np.linalg.norm(after - before, axis=1) / (ends[1] - ends[0])
-        allowed = LIMIT_MARGIN * model.limits.joint_tool_velocity / np.maximum(slope, MIN_SLOPE)
+        allowed = TOOL_VELOCITY_PART * model.limits.joint_tool_velocity / np.maximum(slope, MIN_SLOPE)
         np.minimum(fastest, allowed, out=fastest)
     first[:, n:] *= moves_tool[:, np.newaxis]
     second[:, n:] *= moves_tool[:, np.newaxis]

@@ -15,6 +15,7 @@ period, one period later; on a curve at their mean period, a few periods later; 
 
 _LONGEST_TIME = 0.1  # [s] Time constant of the filter, and length of the mean over the curve, at smoothing 1; tuned.
 _MOST_STEPS = 3.0  # Which the joints may be behind the newest target.
+_LATE = 1.7  # [periods] A target this late is several steps away, or others follow at once; a tuning value.
 _KEPT = 0.9  # Share of a delay that a line to the next target keeps; a tuning value.
 _MEAN_OF = 16  # Intervals in the mean period; a tuning value.
 _LONGEST_PERIOD = 100  # [cycles] A client that streams more slowly is not streaming.
@@ -41,7 +42,7 @@ class StreamFilter:
         self._sum = [window * x for x in q]
         self._curve = StreamCurve(q)
         self._before = list(q)  # The angles before the newest.
-        self._period, self._since = 1, 0
+        self._period, self._since = 1, _LONGEST_PERIOD
         self._periods: deque[int] = deque(maxlen=_MEAN_OF)
         self._mean_period = 1.0  # [cycles] Of "linear", which irregular arrivals disturb less.
         self._steps, self._duration = 1.0, 1.0  # Of the straight line, in targets and in cycles.
@@ -70,14 +71,16 @@ class StreamFilter:
         """Takes the newest angles, n numbers, [rad]."""
         self._period = min(max(1, self._since), _LONGEST_PERIOD)
         left = self._steps * max(0.0, 1.0 - self._since / self._duration)
-        if 0 < self._since < _LONGEST_PERIOD:
+        late = self._since / self._mean_period if self._periods else 1.0  # In periods.
+        if self._since < _LONGEST_PERIOD:
             self._periods.append(self._since)
-            self._mean_period = sum(self._periods) / len(self._periods)
+            self._mean_period = max(1.0, sum(self._periods) / len(self._periods))
         else:  # The first angles, to which the joints move at once.
             self._periods.clear()
-            self._mean_period = 1.0
-        # A target that comes early does not make the joints faster: they still have a part of the last step to go.
-        self._steps = min(1.0 + left, _MOST_STEPS)
+            self._mean_period = late = 1.0
+        # A target that comes early does not make the joints faster: they still have a part of the last step to go. Nor
+        # does a late one.
+        self._steps = max(min(1.0 + left, _MOST_STEPS), late if late > _LATE else 1.0)
         self._duration = self._mean_period * (1.0 + _KEPT * (self._steps - 1.0))
         self._since = 0
         self._start = self._output

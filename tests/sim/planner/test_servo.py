@@ -10,7 +10,7 @@ import pytest
 from rcilab.core.arrays import JointVector
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.sim.planner import Planner, RefusalReason
-from rcilab.sim.planner.stream_filter import StreamMode
+from rcilab.sim.planner.stream_filter import StreamFilter, StreamMode
 from tests.sim.planner.driving import drive, largest_shares, shifted
 
 PERIOD = 4  # [cycles] 250 Hz.
@@ -105,3 +105,19 @@ def test_a_curve_through_streamed_angles_does_not_show_when_each_of_them_came(mo
     rows, _ = drive(planner_of(model), actions)
     wanted = np.array([sine(model, cycle) for cycle in range(400, 1500)])
     assert min(np.abs(rows[500:1500] - wanted[100 - delay :][:1000]).max() for delay in range(50)) < 1e-3
+
+
+@pytest.mark.parametrize(("is_kept", "fastest"), [(True, 1.7e-3), (False, 1.4e-3)])
+def test_targets_that_come_late_and_together_are_not_jumped_to(is_kept, fastest):
+    smoothing, period, late = StreamFilter([0.0], "linear", 0.0), 5, 8
+    arrivals: dict[int, list[float]] = {}
+    last = 0
+    for k in range(80):
+        last = max(last, period * k + (late if k % 40 == 20 else 0))
+        arrivals.setdefault(last, []).append(1e-3 * period * k)
+    q = []
+    for cycle in range(period * 80):
+        for target in arrivals.get(cycle, [])[0 if is_kept else -1 :]:
+            smoothing.take([target])
+        q.append(smoothing.step()[0])
+    assert np.diff(q)[50:].max() < fastest  # [rad] In a cycle; the targets move 1e-3 rad.

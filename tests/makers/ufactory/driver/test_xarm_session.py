@@ -7,6 +7,7 @@ import threading
 import numpy as np
 import pytest
 
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import JointPosition
 from rcilab.core.errors import (
     CommandRejectedError,
@@ -32,6 +33,7 @@ from rcilab.motion import plan_joint
 from rcilab.recording.run import load_run
 from tests.makers.ufactory.driver.conftest import HOME
 
+FAR = np.array([0.0, 0.6, 0.0, 1.8, 0.0, 1.2, 0.0])  # From the axis of joint 1.
 OFF = np.array([0.3, 0.2, -0.2, 0.3, 0.2, 0.1, 0.4])
 ROUNDING = 3e-7  # [rad] Half a unit in the last place of single precision, in which the arm reports its angles.
 CYCLES = 5  # Of 1 ms between two reports in real time.
@@ -49,6 +51,23 @@ def test_a_checked_motion_arrives_and_each_target_is_that_of_its_report(robot, t
     assert (sent["sent_ns"] >= sent["received_ns"]).all()
     run.save(tmp_path / "a.rcirun")
     assert len(load_run(tmp_path / "a.rcirun").cycles) == len(run.cycles)
+
+
+def test_the_fastest_plan_of_a_stretched_arm_stays_below_c60(robot):
+    """A busy machine delays targets by more than any plan can allow for; then it is tried again."""
+    for _ in range(6):
+        robot.recover()
+        robot.xarm.move_j(FAR, 3.0, 20.0)
+        motion = plan_joint(robot.model, robot.state.q_c, FAR + 1.5 * np.eye(7)[0], speed=1.0)
+        speeds = np.linalg.norm(np.diff(robot.model.position_path(motion.q), axis=0), axis=1) / CYCLE_TIME
+        assert speeds.max() > robot.model.limits.cartesian.translation_velocity
+        try:
+            run = robot.execute(motion)
+        except ControlError:
+            continue
+        assert (run.faults, run.stopped) == ((), None)
+        return
+    pytest.fail("the motion was stopped in each of six runs")
 
 
 def test_a_motion_is_stopped_on_request_and_the_next_one_begins_there(robot):

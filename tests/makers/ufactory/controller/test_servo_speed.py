@@ -1,0 +1,39 @@
+"""Plans that are sent as joint targets stay below C60, also when the targets come irregularly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rcilab.conformance.check import check
+from rcilab.makers.ufactory.controller.modes import Mode
+from rcilab.makers.ufactory.wire.functions import Function
+from rcilab.motion import plan_joint
+from rcilab.sim.arm_setup import ArmSetup
+from tests.makers.ufactory.controller.conftest import Arm
+
+FAR = np.array([0.2, 0.6, -1.8, 0.0, 1.2, 0.0])
+PERIOD = 5  # [cycles] Of the reports, each of which a client answers with a target.
+NOTHING = (0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("latest", [0, 1, 2])
+def test_the_fastest_plan_is_followed_with_targets_that_are_late_by_up_to_2_ms(arm: Arm, latest: int) -> None:
+    model = arm.controller.model
+    motion = plan_joint(model, FAR, FAR + [2.0, 0.0, 0.0, 0.0, 0.0, 0.0], speed=1.0)
+    assert check(motion, model, distance=None).ok
+    arm.controller.set_up(ArmSetup(q=tuple(FAR)))
+    arm.ready(Mode.SERVO)
+    rng = np.random.default_rng(latest)
+    rows = {row + int(rng.integers(latest + 1)): row for row in range(0, len(motion.q) + PERIOD, PERIOD)}
+    fastest = 0.0
+    for cycle in range(max(rows) + 1):
+        if cycle in rows:
+            q = motion.q[min(rows[cycle], len(motion.q) - 1)]
+            assert arm.call(Function.SERVO_JOINT, "10f", *q, *NOTHING)[0] == 0
+        arm.step()
+        fastest = max(fastest, float(np.linalg.norm(arm.controller.arm.tool_c.twist[:3])))
+    arm.run()
+    assert arm.controller.error is None
+    assert fastest > 0.84 * model.limits.joint_tool_velocity
+    np.testing.assert_allclose(arm.q, motion.q[-1], atol=1e-6)
