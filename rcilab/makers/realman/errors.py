@@ -213,7 +213,7 @@ def errors_of_codes(system: Iterable[int], joints: Iterable[int]) -> tuple[RealM
     """Returns the errors that a controller reports, in the order of their members; unknown numbers are left out.
 
     Args:
-        system: The numbers of the system's errors; 0 is none.
+        system: The numbers of the system's errors; 0: no error.
         joints: The error word of each joint.
     """
     found = {_SYSTEM[code] for code in system if code in _SYSTEM}

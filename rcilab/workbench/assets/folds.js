@@ -1,4 +1,4 @@
-// Groups stay folded or open as somebody left them: viser builds them anew with the page, and with another language.
+// Groups stay folded or open as they were left: viser builds them anew with the page, and with another language.
 // Unnecessary once viser keeps the state of a folder in the browser, by its label.
 (() => {
   "use strict";

@@ -36,7 +36,7 @@ class PushedState(msgspec.Struct, frozen=True):
     joint_status: JointStatus
     waypoint: Waypoint
     err: list[int]
-    """Errors of the system; 0 is none."""
+    """Errors of the system; 0: no error."""
     arm_current_status: str = ""
     """What the arm does; "": not pushed."""
 
