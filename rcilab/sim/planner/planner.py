@@ -120,6 +120,11 @@ class Planner:
         return PlannerState.IDLE if self._queue.is_idle else PlannerState.MOVING
 
     @property
+    def is_blocked(self) -> bool:
+        """Whether a twist has ended, or almost, where no joint velocities give it, as at the end of reach."""
+        return isinstance(self._mover, VelocityMover) and self._mover.is_blocked
+
+    @property
     def q(self) -> list[float]:
         """Joint angles of the last cycle, n plain floats, [rad]."""
         return list(self._q)

@@ -20,6 +20,7 @@ from rcilab.sim.planner.section_bounds import joint_bounds
 from rcilab.sim.planner.target import JointSpeed, ToolSpeed
 
 _ABOVE = 1.001  # Part of the present acceleration that the bound is at least: it must be inside.
+_BLOCKED_BELOW = 0.01  # Part of its twist at which the tool counts as stopped; a tuning value.
 _SLOWEST = 0.01  # Part of its acceleration and jerk that a joint may use at least, also where its change is small.
 
 
@@ -60,6 +61,12 @@ class VelocityMover:
     def is_stationary(self) -> bool:
         """Whether the arm stands and is not to move."""
         return self._is_stopping and self._jog is not None and self._jog.is_stationary
+
+    @property
+    def is_blocked(self) -> bool:
+        """Whether the tool has stopped, or almost, where no joint velocities give its twist, as at the end of reach."""
+        jog = self._jog
+        return not self._is_stopping and jog is not None and jog.is_damped and jog.part < _BLOCKED_BELOW
 
     def set_joint_velocity(
         self, dq: Sequence[float], speed: JointSpeed, *, is_synchronized: bool, duration: float | None

@@ -553,6 +553,10 @@ class XArmController:
                 remark = Remark(text, "servo_speed", value=speed, bound=bound, unit="m/s")
                 self.fail(UfactoryError.SERVO_LINEAR_SPEED, remark)
                 return
+        if self.planner.is_blocked:
+            text = "the tool cannot move on with this velocity: it is at the end of its reach, or at a singular pose"
+            self.fail(UfactoryError.KINEMATICS, Remark(text, "twist_blocked"))
+            return
         if self.settings.self_collision:
             touching = self._links.step(self.arm.signals.measured.q)
             if touching is not None:

@@ -84,11 +84,17 @@ def leave_the_reduced_range(arm: Arm) -> None:
     arm.move_joints((Q6[0] + 0.2, *Q6[1:]))
 
 
+def velocity_beyond_reach(arm: Arm) -> None:
+    arm.ready(Mode.CARTESIAN_VELOCITY)
+    arm.call(Function.CARTESIAN_VELOCITY, "6fB", 200.0, *(0.0,) * 5, 0)
+
+
 CAUSES: list[tuple[int, Callable[[Arm], None]]] = [
     (1, press),
     (2, open_input),
     (3, press_switch),
     (21, out_of_reach),
+    (21, velocity_beyond_reach),
     (22, through_itself),
     (23, beyond_the_range),
     (23, leave_the_reduced_range),
