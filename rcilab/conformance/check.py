@@ -13,6 +13,7 @@ from rcilab.conformance.catalogue import Phrase
 from rcilab.conformance.certificate import issue_certificate
 from rcilab.conformance.clearance_conditions import FAR, clearance_conditions
 from rcilab.conformance.common_conditions import condition_table
+from rcilab.conformance.free_elbow import leaves_elbow_free, resulting_motion
 from rcilab.conformance.limit_utilisation import Usage, near_bound, worst_of
 from rcilab.conformance.report import ConditionResult, Report, Violation
 from rcilab.conformance.signals import HOLD_SAMPLES as HOLD_SAMPLES
@@ -56,8 +57,10 @@ def check(
     take most of the time.
 
     By default joint angles are commanded. In Cartesian modes the corresponding poses of the tool and arm angles are:
-    tool, arm angle, singularity and joint angles are checked. In torque mode the torques of the motion are commanded:
-    torques and joint ranges are checked.
+    tool, arm angle, singularity and joint angles are checked. Where no arm angle is sent (FR3), the joint angles are
+    those that the poses lead to with the least motion of the joints, and the title has their distance from the plan;
+    the maker does not publish its own inverse. In torque mode the torques of the motion are commanded: torques and
+    joint ranges are checked.
 
     A motion that ends inside the joint ranges may start up to `RECOVERY_RANGE` outside, and must then move back and not
     farther out, like those of `plan_recovery`. A tool that starts outside the box may only move inwards.
@@ -77,6 +80,21 @@ def check(
             valid for this arm.
     """
     return _check(motion, model, start, box, distance, mode)
+
+
+def check_speed_change(motion: Motion, model: RobotModel, *, start: StartState | None, mode: Mode) -> Report:
+    """Checks the rows of a motion from a change of its speed on; their path has been checked.
+
+    Args:
+        motion: The rows, as the joints follow them.
+        model: The arm.
+        start: State of the arm at the first row; None for a stationary arm.
+        mode: Mode of the motion.
+    """
+    is_free = leaves_elbow_free(model, mode)
+    return _check(
+        motion, model, start, None, None, mode, record=Record(has_free_elbow=True, is_to_come=True) if is_free else None
+    )
 
 
 def check_torques(
@@ -164,12 +182,23 @@ def _check(
     if distance is not None:
         rows = (*rows, *clearance_conditions(distance))
     if record is not None:
-        is_missing = {"start": state.moving, "throughout": False, "end": record.was_stopped}
-        is_free = record.has_free_elbow and mode.startswith("cartesian")
-        rows = tuple(row for row in rows if not (is_missing[row.stage] or (is_free and row.signal == "arm_angle")))
+        rows = _rows_of_record(rows, record, state, mode)
     return _report(
         motion, rows, model=model, start=state, box=box, distance=distance, mode=mode, torques=torques, record=record
     )
+
+
+def _rows_of_record(
+    rows: tuple[Condition, ...], record: Record, start: StartState, mode: Mode
+) -> tuple[Condition, ...]:
+    """Returns the conditions for which there is something to check."""
+    is_missing = {
+        "start": start.moving and not record.is_to_come,
+        "throughout": False,
+        "end": record.was_stopped,
+    }
+    is_free = record.has_free_elbow and mode.startswith("cartesian")
+    return tuple(row for row in rows if not (is_missing[row.stage] or (is_free and row.signal == "arm_angle")))
 
 
 def _report(
@@ -185,18 +214,24 @@ def _report(
     record: Record | None = None,
 ) -> Report:
     """Returns the report on a motion by some of the conditions."""
-    checker = _MotionChecker(motion, model, start, box, distance, mode, torques, record)
+    followed, known = motion, record
+    if record is None and leaves_elbow_free(model, mode):
+        followed = resulting_motion(motion, model, mode)
+        is_cut = len(followed) < len(motion)
+        known = Record(was_stopped=is_cut, refused_pose=is_cut, has_free_elbow=True, is_to_come=not is_cut)
+        rows = _rows_of_record(rows, known, start, mode)
+    checker = _MotionChecker(followed, model, start, box, distance, mode, torques, known)
     results = [checker.evaluate(row) for row in rows]
     found = sorted((v for _, violations in results for v in violations), key=lambda v: -v.ratio)
     facts = {"model": model.name, "law": motion.law, "duration": f"{motion.duration:.3f}", "speed": f"{motion.speed:g}"}
     return Report(
-        title=_title(model, mode, facts),
+        title=_title(model, mode, facts, _distance_between(followed, motion)),
         rows=tuple(result for result, _ in results),
         violations=tuple(v for v in found if v.condition.necessity == "necessary"),
         warnings=tuple(v for v in found if v.condition.necessity == "recommended"),
         motion=motion,
         start=start,
-        measure=partial(checker.usage, rows),
+        measure=partial(checker.usage, rows, len(motion)),
         issue=_issue_none
         if torques is not None or record is not None
         else partial(issue_certificate, motion, model, start, box, distance, mode),
@@ -206,7 +241,14 @@ def _report(
     )
 
 
-def _title(model: RobotModel, mode: Mode, facts: dict[str, str]) -> Phrase:
+def _distance_between(followed: Motion, motion: Motion) -> float:
+    """Returns the largest distance of the joints from their plan, [rad]; of a motion that is followed as planned, 0."""
+    return 0.0 if followed is motion else float(np.abs(followed.q - motion.q[: len(followed)]).max())
+
+
+def _title(model: RobotModel, mode: Mode, facts: dict[str, str], away: float) -> Phrase:
+    if away:
+        return Phrase("title.free_elbow", **facts, mode=mode, away=away)
     if mode != "joint_position":
         return Phrase("title.in_mode", **facts, mode=mode)
     table = model.description.conditions
@@ -238,7 +280,7 @@ class _MotionChecker:
     ) -> None:
         self._motion = motion
         self._limits = _limits_of(motion, model.limits, start)
-        self._is_record = record is not None
+        self._is_record = record is not None and not record.is_to_come
         self._signals = MotionSignals(motion, model, start, box, distance, mode, torques, record)
         self._depth = min(box.size) / 2.0 if box is not None else 1.0
 
@@ -296,10 +338,10 @@ class _MotionChecker:
             return condition
         return replace(condition, source=self._limits.source("joint.upper"))
 
-    def usage(self, conditions: tuple[Condition, ...]) -> Usage:
-        """Returns the worst of the necessary conditions on every row of the motion, by row."""
+    def usage(self, conditions: tuple[Condition, ...], count: int) -> Usage:
+        """Returns the worst of the necessary conditions by row, for a number of rows; out of reach stays so."""
         necessary = [row for row in conditions if row.necessity == "necessary" and row.stage == "throughout"]
-        return worst_of((row, self._used(row)) for row in necessary)
+        return worst_of((row, _lengthened(self._used(row), count)) for row in necessary)
 
     def _used(self, condition: Condition) -> Array:
         values, _ = self._signals.table(condition)
@@ -389,6 +431,11 @@ def _nearest_bound(value: float, lower: Array, upper: Array, row: int, column: i
         return float((upper if value >= 0.0 else lower)[row, column])
     low, high = float(lower[column]), float(upper[column])
     return high if value >= (low + high) / 2.0 else low
+
+
+def _lengthened(ratio: Array, count: int) -> Array:
+    """Returns the values of at least a number of rows, the last one repeated."""
+    return np.concatenate((ratio, np.repeat(ratio[-1:], max(count - len(ratio), 0))))
 
 
 def _is_isolated(values: Array, begin: int, end: int, worst: float) -> bool:

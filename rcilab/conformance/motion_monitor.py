@@ -31,12 +31,13 @@ from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.condition import Condition
-from rcilab.core.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.core.safety_box import SafetyBox, active_box, box_for_start
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.core.state import Mode, require_mode
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.bounds import RECOVERY_RANGE, range_from
+from rcilab.motion.ik_tracker import IkTracker
 
 
 class Monitor:
@@ -66,6 +67,7 @@ class Monitor:
         self._model, self.mode = require_model(model), require_mode(mode)
         self._has_elbow = bool(model.redundancy)
         table, self._safety_box = condition_table(model.description), active_box(box)
+        self._tracker = IkTracker(model) if self._has_elbow and table.has_free_elbow else None
         limits = model.limits
         self._own_rows = {row.id: row for row in table.conditions}
         rows = table.rows(self.mode, has_elbow=self._has_elbow)
@@ -147,7 +149,8 @@ class Monitor:
         history advances, and the caller must `reset`. A pose without joint angles does not change the joints.
 
         Args:
-            command: Command of the mode; without an arm angle the last one is used.
+            command: Command of the mode; without an arm angle the last one is used, or the joints move as little as
+                possible, as the arm's controller does it.
             cycles: Cycles since the last command, 1 or more.
             side: Side of the elbow, +1 or -1 as by `model.elbow`, for interfaces that command it with every pose; None
                 is the last one.
@@ -204,22 +207,28 @@ class Monitor:
         if len(numbers) != 16 or find_frame_error(numbers) is not None:
             return [self._pose_violation(math.inf)]
         pose = Pose.from_row_major(numbers)
+        tracker = self._tracker if command.psi is None else None
         if self._has_elbow and command.psi is not None:
             self._psi = float(command.psi)
-        monitor.step(pose, self._psi, cycles)
+        monitor.step(pose, self._psi if tracker is None else None, cycles)
         distance = math.dist(pose.parts[1], self._start_pose.parts[1])
-        turn = 0.0 if self._psi is None else self._psi - (self._start_psi or 0.0)
+        turn = 0.0 if self._psi is None or tracker is not None else self._psi - (self._start_psi or 0.0)
         found = self._check_start({"translation": [distance], "arm_angle": [math.remainder(turn, math.tau)]})
         found += self._with_own_rows(monitor.violations())
-        flange = pose @ self._T_tool_flange if self._has_tool else pose
-        q = self._inverse.solve_near(flange, self._psi or 0.0, self._joints_on_side(side))
+        q = self._solve(pose, side) if tracker is None else _follow(tracker, pose, self._q)
         if q is None:
             return [*found, self._pose_violation(math.inf)]
         self._q = q
-        if self._inverse.is_singular(q):
+        if tracker is not None:
+            self._psi = self._arm_angle(np.array(q))
+        elif self._inverse.is_singular(q):
             found.append(self._pose_violation(float(self._inverse.singularity_path(np.array([q]))[0])))
         found += self._check_elbow(q) + self._check_joints(q, cycles)
         return found + self._standstill.step(self._last_difference, cycles, is_last=command.finished)
+
+    def _solve(self, pose: Pose, side: int | None) -> list[float] | None:
+        flange = pose @ self._T_tool_flange if self._has_tool else pose
+        return self._inverse.solve_near(flange, self._psi or 0.0, self._joints_on_side(side))
 
     def _check_joints(self, q: list[float], cycles: int) -> list[LimitViolation]:
         assert self._joints is not None
@@ -317,6 +326,14 @@ class Monitor:
     def _kind_error(self, command: object) -> InvalidValueError:
         kind = "JointTorque" if self._torques is not None else "CartesianPosition" if self._tool else "JointPosition"
         return InvalidValueError("command", described(command), f"must be a {kind} in the mode {self.mode}")
+
+
+def _follow(tracker: IkTracker, pose: Pose, near: list[float]) -> list[float] | None:
+    """Returns the joint angles of a pose without an arm angle; None if it is out of reach or singular."""
+    try:
+        return tracker.follow(pose, near)
+    except KinematicsError:
+        return None
 
 
 def _in_order(rows: Iterable[Condition], order: Iterable[Condition]) -> list[Condition]:

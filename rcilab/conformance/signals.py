@@ -42,7 +42,7 @@ _INTERPOLATED_PART = 0.8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Record:
-    """What is known of recorded commands beyond their joint angles."""
+    """What is known of commands beyond their joint angles."""
 
     was_stopped: bool = False
     """Whether something other than the client ended the motion."""
@@ -53,6 +53,8 @@ class Record:
     them: it is compared with them but not differentiated. None: the start of the check."""
     has_free_elbow: bool = False
     """Whether the controller left the arm angle free: it has no conditions then, nor poses singular for it alone."""
+    is_to_come: bool = False
+    """Whether they are not recorded but planned: the controller will hold the last one."""
 
 
 class MotionSignals:
@@ -66,7 +68,7 @@ class MotionSignals:
         distance: Required distances of the links from each other and from the floor, or None.
         mode: Mode of the motion. Commanded torques are computed in every row, as the controller checks each.
         torques: Commanded torques, shape (N, n), [N m]; None: those of the motion.
-        record: Of recorded commands, which are not continued after the last row; None: a motion to come.
+        record: What else is known of the commands; None: a motion to come.
     """
 
     def __init__(
@@ -88,7 +90,7 @@ class MotionSignals:
         self._box = box
         self._distance = distance
         self._mode: Mode = mode
-        hold = HOLD_SAMPLES if record is None else 0
+        hold = HOLD_SAMPLES if record is None or record.is_to_come else 0
         self._differences = _backward_differences(motion.q, start, hold)
         self.is_off_start = bool(np.abs(motion.start - start.q).max() > START_POSITION_TOLERANCE)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcilab.conformance.check import check
+from rcilab.conformance.check import check_speed_change
 from rcilab.conformance.report import Violation
 from rcilab.conformance.start import StartState
 from rcilab.core.arrays import Array
@@ -94,7 +94,7 @@ def _violations(candidate: SpeedScaledMotion, model: RobotModel, mode: Mode) -> 
         rows, start = candidate.q, None
     else:
         start = _state(candidate.q[first - PREVIOUS_ROWS : first + 1])
-    report = check(Motion.from_cycles(rows), model, start=start, distance=None, mode=mode)
+    report = check_speed_change(Motion.from_cycles(rows), model, start=start, mode=mode)
     return list(report.violations)
 
 

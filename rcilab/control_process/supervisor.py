@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rcilab.conformance.free_elbow import resulting_motion
 from rcilab.conformance.speed_scaling_check import plan_start_with_override
 from rcilab.control_process.configuration_sync import ConfigurationSync, standard_setup
 from rcilab.control_process.jog_record import hold_jog, release_jog
@@ -266,6 +267,7 @@ class Supervisor(Closeable):
             box=self._setup.requested.box,
             mode=mode,
         )
+        motion = resulting_motion(motion, self.model, mode)
         scaled = plan_start_with_override(motion, speed_override, self.model, mode)
         with self._lock:
             self._require_unstopped(stops)

@@ -172,6 +172,8 @@ class ConditionTable:
     """Cycles from one command of a motion to the next: of its rows, only every so many are sent."""
     has_free_elbow: bool = False
     """Whether poses without an arm angle leave it free: the joints move least. Otherwise the arm angle is held."""
+    sends_arm_angle: bool = True
+    """Whether a session sends the arm angle with poses, as far as the arm has one."""
 
     def rows(self, mode: Mode, *, has_elbow: bool = True, has_box: bool = False) -> tuple[Condition, ...]:
         """Returns the conditions on a motion in a mode, except those on distances.

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from rcilab.conformance.certificate import Certificate, require_certificate
 from rcilab.conformance.check import check
+from rcilab.conformance.free_elbow import resulting_motion
 from rcilab.conformance.speed_scaling_check import plan_start_with_override
 from rcilab.core.arrays import JointVector, as_number, described
 from rcilab.core.clock import CYCLE_TIME
@@ -321,7 +322,8 @@ class RobotSession(Closeable):
         """Checks a motion by the conditions of the mode, streams it and returns its run.
 
         From another thread, `pause`, `resume` and `set_speed_override` change its speed, and `progress` returns its
-        progress. In torque and impedance modes the arm is compliant and ends next to its goal: `Run.goal_error`.
+        progress. In torque and impedance modes the arm is compliant and ends next to its goal: `Run.goal_error`. Where
+        poses are sent without the arm angle (FR3), the plan of the run has the joint angles that they lead to.
 
         Args:
             motion: The motion; it must begin at the commanded angles of the arm, `state.q_c`.
@@ -352,6 +354,7 @@ class RobotSession(Closeable):
                 self._require_allowed(motion, start, mode)
             else:
                 certificate.verify(motion, self.model, start, self.safety_box, mode=mode)
+            motion = resulting_motion(motion, self.model, mode)
             scaled = plan_start_with_override(motion, speed_override, self.model, mode)
             planned = scaled.as_motion()
             stream = MotionStream(scaled.q, mode, self.model, report_progress(planned, progress))

@@ -339,6 +339,7 @@ FR3_CONDITIONS = ConditionTable(
     box=_BOX,
     conditions=tuple(_FR3.values()),
     has_free_elbow=True,
+    sends_arm_angle=False,  # The poses of pylibfranka have no elbow.
 )
 """The rows of the FR3."""
 

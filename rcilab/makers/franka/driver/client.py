@@ -18,6 +18,7 @@ from rcilab.makers.address import ControllerAddress
 from rcilab.makers.franka.driver.client_sockets import open_with_sockets
 from rcilab.makers.franka.driver.libraries import kept_scheduling
 from rcilab.makers.franka.driver.state_reader import number_of
+from rcilab.makers.network import find_route
 
 ANSWER_TIMEOUT = 5.0  # [s] For the answer to a request, which a controller gives within a few cycles. A tuning value.
 
@@ -52,7 +53,10 @@ class FciClient(ABC):
             return robot, state
 
         with kept_scheduling():
-            (self.robot, first), self.sockets = open_with_sockets(open_robot, state_size, address.port, str(address))
+            peer = find_route(address).host, address.port
+            (self.robot, first), self.sockets = open_with_sockets(
+                open_robot, state_size, peer, str(address), ANSWER_TIMEOUT
+            )
         self.newest: Any = first
         """The newest state."""
 

@@ -33,14 +33,16 @@ class ClientSockets:
         limit: Time limit of the client's calls.
 
     Args:
+        limit: As the attribute.
         tcp: Connected to the controller.
         udp: Where states arrive.
         state_size: Size of a state, [bytes].
         name: Name of the controller in errors.
     """
 
-    def __init__(self, tcp: socket.socket, udp: socket.socket, state_size: int, name: str) -> None:
-        self.limit = CallLimit(tcp)
+    def __init__(self, limit: CallLimit, tcp: socket.socket, udp: socket.socket, state_size: int, name: str) -> None:
+        self.limit = limit
+        limit.watch(tcp)
         self._tcp, self._udp = tcp, udp
         self._state_size = state_size
         self._name = name
@@ -112,23 +114,43 @@ class ClientSockets:
 
 
 def open_with_sockets(
-    open_client: Callable[[], Client], state_size: int, port: int, name: str
+    open_client: Callable[[], Client], state_size: int, peer: tuple[str, int], name: str, timeout: float
 ) -> tuple[Client, ClientSockets]:
     """Returns a new client and its sockets.
 
     Args:
         open_client: Connects a client.
         state_size: Size of a state, [bytes].
-        port: TCP port of the controller.
+        peer: IPv4 address and TCP port of the controller.
         name: Name of the controller in errors.
+        timeout: For the client to connect, [s].
 
     Raises:
-        ConnectionLostError: The client raised an error, or did not open a TCP and a UDP socket.
+        ConnectionLostError: The client raised an error, was not connected in time, or did not open a TCP and a UDP
+            socket.
     """
+    limit = CallLimit(*peer)
+    try:
+        return _open_with_sockets(open_client, state_size, limit, peer[1], name, timeout)
+    except BaseException:
+        limit.close()
+        raise
+
+
+def _open_with_sockets(
+    open_client: Callable[[], Client], state_size: int, limit: CallLimit, port: int, name: str, timeout: float
+) -> tuple[Client, ClientSockets]:
     before = _open_sockets().keys()
+    limit.start(timeout)
     try:
         client = open_client()
+        limit.stop()
     except Exception as error:  # The libraries have no common base class.
+        if limit.has_ended:
+            raise ConnectionLostError(
+                f"{name}: the controller answers, but the client library got no answer within {timeout:g} s; close "
+                "other clients of this controller, or restart it, and connect again"
+            ) from error
         raise ConnectionLostError(
             f"{name}: the controller answers, but the client library cannot connect "
             f"({str(error).removeprefix('libfranka: ')}); check that no firewall drops the datagrams (UDP) in which "
@@ -145,7 +167,7 @@ def open_with_sockets(
             duplicate.close()
     if tcp is None or udp is None:
         raise ConnectionLostError(f"{name}: the client library is not connected; connect again")
-    return client, ClientSockets(tcp, udp, state_size, name)
+    return client, ClientSockets(limit, tcp, udp, state_size, name)
 
 
 def _open_sockets() -> dict[int, int]:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from rcilab.core.errors import ConnectionLostError
+from rcilab.makers.franka.driver.call_limit import CallLimit
 from rcilab.makers.franka.driver.client_sockets import ClientSockets, open_with_sockets
 
 SIZE = 40
@@ -45,7 +46,8 @@ def ends() -> Iterator[Ends]:
 
 @pytest.fixture
 def sockets(ends: Ends) -> Iterator[ClientSockets]:
-    made = ClientSockets(ends.tcp.dup(), ends.udp.dup(), SIZE, "fci://robot")
+    limit = CallLimit("127.0.0.1", ends.port)
+    made = ClientSockets(limit, ends.tcp.dup(), ends.udp.dup(), SIZE, "fci://robot")
     yield made
     made.close()
 
@@ -91,7 +93,7 @@ def test_the_sockets_that_a_client_opens_are_found_among_others(ends: Ends):
             udp.bind(("0.0.0.0", 0))
             return socket.create_connection(address), udp
 
-        (tcp, udp), found = open_with_sockets(open_client, SIZE, address[1], "fci://robot")
+        (tcp, udp), found = open_with_sockets(open_client, SIZE, address, "fci://robot", 5.0)
         robot, _ = listener.accept()
         with tcp, udp, robot, socket.socket(type=socket.SOCK_DGRAM) as sender:
             sender.bind(("127.0.0.1", 0))
@@ -101,4 +103,4 @@ def test_the_sockets_that_a_client_opens_are_found_among_others(ends: Ends):
             assert robot.recv(1) == b""
             found.close()
     with pytest.raises(ConnectionLostError, match="the client library is not connected"):
-        open_with_sockets(lambda: None, SIZE, 1337, "fci://robot")
+        open_with_sockets(lambda: None, SIZE, ("127.0.0.1", 1337), "fci://robot", 5.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 import signal
 import socket
 import struct
@@ -21,7 +22,7 @@ from rcilab.core.optional_deps import MissingExtraError
 from rcilab.execution.connect import connect
 from rcilab.makers.address import ControllerAddress
 from rcilab.makers.franka.driver import address as fci_address
-from rcilab.makers.franka.driver import libraries
+from rcilab.makers.franka.driver import client, libraries
 from rcilab.makers.franka.driver.address import parse_address
 from rcilab.makers.franka.driver.handshake import find_version
 from rcilab.model.robot_model import load_model
@@ -136,6 +137,25 @@ def test_a_controller_that_answers_too_slowly_is_not_waited_for():
         thread.start()
         with pytest.raises(ConnectionLostError, match=r"accepted the connection and did not answer within 0\.5 s"):
             find_version(address, 10, 0.5)
+        thread.join()
+
+
+@pytest.mark.parametrize(("name", "version"), [pytest.param("Panda", 5), pytest.param("FR3", 10, marks=NO_LIBRARY)])
+def test_a_client_library_without_an_answer_is_not_waited_for(monkeypatch, name, version):
+    monkeypatch.setattr(client, "ANSWER_TIMEOUT", 1.0)
+    host = ".".join(["127", *(str(secrets.randbelow(254) + 1) for _ in range(3))])
+    with socket.create_server((host, 1337)) as listener:
+
+        def serve() -> None:
+            peer, _ = listener.accept()
+            with peer:
+                peer.recv(64)
+                peer.sendall(struct.pack("<IIIBH", 0, 0, 15, 0, version))
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        with pytest.raises(ConnectionLostError, match="the client library got no answer within 1 s"):
+            connect(f"fci://{host}", load_model(name))
         thread.join()
 
 

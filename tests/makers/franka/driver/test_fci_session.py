@@ -99,6 +99,32 @@ def test_cartesian_modes_bring_the_tool_to_its_goal(robot, mode, reached):
     assert np.linalg.norm(off) <= reached
 
 
+def test_the_plan_of_poses_has_the_joint_angles_that_the_arm_follows(robot):
+    motion = plan_joint(robot.model, robot.state.q_c, robot.model.home + OFF, speed=0.4)
+    report = check(motion, robot.model, mode="cartesian_position").require()
+    run = robot.execute(motion, report.certificate, mode="cartesian_position")
+    assert np.abs(run.error).max() <= 1e-6
+    is_free = robot.model.name == "FR3"
+    assert ("sent without the arm angle" in report.title) is is_free
+    assert bool(np.abs(robot.state.q_c - motion.goal).max() > 0.1) is is_free
+    assert run.plan.goal == pytest.approx(robot.state.q_c, abs=1e-6)
+
+
+def test_the_speed_of_poses_is_changed_on_the_way(robot):
+    motion = plan_joint(robot.model, robot.state.q_c, robot.model.home + OFF, speed=0.1)
+    changed = []
+
+    def progress(t, duration):
+        if t > 0.3 and not changed:
+            changed.append(threading.Thread(target=robot.set_speed_override, args=(0.5,)))
+            changed[0].start()
+
+    run = robot.execute(motion, progress=progress, mode="cartesian_position", speed_override=0.8)
+    changed[0].join()
+    assert run.duration > 1.2 * motion.duration
+    assert np.abs(run.error).max() <= 1e-5  # The rows between those of the plan are interpolated.
+
+
 def test_torques_make_the_compliant_arm_follow(robot):
     goal = robot.model.home + OFF
     robot.execute(plan_joint(robot.model, robot.state.q_c, goal, speed=0.3, law="torque_rate_limited"), mode="torque")
