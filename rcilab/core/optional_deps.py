@@ -43,13 +43,14 @@ def require_installed(library: str, purpose: str, extra: Extra = "lab") -> None:
         raise MissingExtraError(library, purpose, extra)
 
 
-def require_library(name: str, purpose: str, extra: Extra = "export") -> Any:
+def require_library(name: str, purpose: str, extra: Extra = "export", package: str = "") -> Any:
     """Returns a library of an extra.
 
     Args:
         name: Name of the module.
         purpose: The feature that needs it.
         extra: The extra that contains it.
+        package: Name of the package that is installed, if it is another one.
 
     Raises:
         MissingExtraError: It is not installed.
@@ -57,4 +58,4 @@ def require_library(name: str, purpose: str, extra: Extra = "export") -> Any:
     try:
         return import_module(name)
     except ImportError as error:
-        raise MissingExtraError(name.split(".")[0], purpose, extra) from error
+        raise MissingExtraError(package or name.split(".")[0], purpose, extra) from error

@@ -337,8 +337,9 @@ def open_driver(address: str, timeout: float, expected: ExpectedArm | None) -> S
     maker = _maker_at(address, None if expected is None else expected.maker)
     try:
         return maker.open_driver(address, timeout, expected)
-    except DeadlineError as error:
-        other = _other_maker_at(maker, maker.parse_address(address))
+    except (DeadlineError, ConnectionLostError) as error:
+        is_silent = isinstance(error, DeadlineError) or error.code == "other_protocol"
+        other = _other_maker_at(maker, maker.parse_address(address)) if is_silent else None
         if other is None:
             raise
         raise ConnectionLostError(

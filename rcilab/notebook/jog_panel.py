@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.app.arm_features import has_zero_pose
+from rcilab.app.goal.goal import verdict_lead
 from rcilab.app.goal.goal_actions import MoveJoint, PoseGoal, PoseName
 from rcilab.core.arrays import JointVector
 from rcilab.i18n.rounding import format_fixed
@@ -96,7 +97,8 @@ class JogPanel(Part):
             self._writing = False
         write(self._pose, self._describe_pose())
         reach = state.now.goal.reach
-        write(self._reach, verdict(reach.tone, self.text(f"reach.tone.{reach.tone}"), self.text.render(reach.reason)))
+        lead = self.text(verdict_lead(reach.tone, reach.reason))
+        write(self._reach, verdict(reach.tone, lead, self.text.render(reach.reason)))
 
     def _describe_pose(self) -> str:
         pose = self.model.forward(self.state.now.goal.q)

@@ -8,7 +8,7 @@ from typing import Any
 import ipywidgets
 import numpy as np
 
-from rcilab.app.goal.goal import POSE_FIELDS, distinguishing_joints, margin
+from rcilab.app.goal.goal import NO_SOLUTIONS, POSE_FIELDS, distinguishing_joints, margin, verdict_lead
 from rcilab.app.goal.goal_actions import FURTHEST, ChooseBranch, SetArmAngle
 from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose
@@ -120,8 +120,8 @@ class TargetPanel(Part):
             values = (*(1e3 * goal.target.position), *np.degrees(goal.target.rpy))
             for field, value in zip(self.fields, values, strict=True):
                 field.show(float(value))
-            tone = goal.reach.tone
-            sentence = verdict(tone, text(f"reach.tone.{tone}"), text.render(goal.reach.reason))
+            tone, why = goal.reach.tone, goal.reach.reason
+            sentence = verdict(tone, text(verdict_lead(tone, why)), text.render(why))
             if goal.reach.missed_by is not None:
                 sentence += soft(text("target.leads_short", short=text.render(goal.reach.missed_by)))
             write(self._reach, sentence)
@@ -152,7 +152,7 @@ class TargetPanel(Part):
         solutions = goal.reach.solutions
         if solutions is None or not len(solutions):
             self.branches.layout.display = "none"
-            code = "target.out_of_reach" if goal.reach.tone == "bad" else "target.no_branches"
+            code = NO_SOLUTIONS.get(verdict_lead(goal.reach.tone, goal.reach.reason), "target.no_branches")
             write(self._table, soft(text(code)))
             return
         model, rows, angles = self.model, [], np.asarray(list(solutions))

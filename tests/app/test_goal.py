@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rcilab.app.goal.goal import NEAR_LIMIT, evaluate_joints, evaluate_pose, goal_toward, margin
+from rcilab.app.goal.goal import NEAR_LIMIT, evaluate_joints, evaluate_pose, goal_toward, margin, verdict_lead
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae.robots import ROBOTS
 from rcilab.model.robot_model import load_model
@@ -62,9 +62,13 @@ def test_a_joint_near_its_limit_is_named(name):
     q[0] = model.limits.joint.upper[0] - 0.5 * NEAR_LIMIT
     reach = evaluate_joints(model, q)
     assert reach.tone == "warn"
+    assert verdict_lead(reach.tone, reach.reason) == "reach.tone.warn"
     assert reach.reason.code == "reach.limit"
     assert reach.reason.values["joint"] == 1
     assert margin(model, q).joint == 1
+    q[0] = model.limits.joint.upper[0]
+    reach = evaluate_joints(model, q)
+    assert (reach.reason.code, verdict_lead(reach.tone, reach.reason)) == ("reach.at_limit", "reach.tone.no_goal")
 
 
 def test_a_stretched_arm_is_called_singular():

@@ -35,7 +35,14 @@ def test_every_limit_has_a_source(name):
         "ufactory": "user manual of UFACTORY Studio, 10",
         "realman": "the maker's client library",
     }
-    assert places[model.description.maker] in limits.source("joint.velocity")
+    assert places[model.description.maker] in limits.source("joint.acceleration")
+
+
+def test_the_ranges_of_an_fr3_have_a_source_of_their_own():
+    limits = load_model("FR3").limits
+    assert limits.source("joint.lower") == limits.source("joint.near_ends") == limits.source("joint.velocity")
+    assert limits.source("joint.lower").startswith("URDF of the FR3")
+    assert limits.source("joint.jerk").startswith("Franka's page")
 
 
 def test_an_unknown_limit_lists_the_known_ones():

@@ -16,13 +16,14 @@ from rcilab.app.check.report_rows import row_tone, row_word
 from rcilab.app.check.slowdown_job import scaled, slow_to_goal
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import GoalActions
-from rcilab.app.planning import Plan
+from rcilab.app.planning import Plan, build_plan_view
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import PlanProgram, ProgramActions
 from rcilab.app.program.program_draft import Draft, number_at
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import Text
 from rcilab.app.view_actions import PLOTS
+from rcilab.conformance.check import check
 from rcilab.conformance.time_scaling import can_slow_down_help
 from rcilab.control_process import SupervisorStatus
 from rcilab.control_process.status import Phase
@@ -31,7 +32,7 @@ from rcilab.core.spatial import Pose
 from rcilab.i18n.units import Units
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.model.robot_model import load_model
-from rcilab.motion import Program, Waypoint
+from rcilab.motion import Program, Waypoint, plan_joint
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.check_rows import rows_html
 from rcilab.workbench.panels.target import planned_html
@@ -249,6 +250,16 @@ def test_what_only_allows_for_rounding_is_0_and_the_verdict_counts_conditions_as
     assert "%" not in rest.partition("rl-meter")[0]
     headline = CheckPanel(Text("en"), lambda request: None)._headline(bench.plan, None, None, is_current=True)
     assert f"Violated conditions: 1 (occurrences: {len(report.violations)})." in headline
+
+
+@pytest.mark.parametrize(("name", "is_free"), [("FR3", True), ("Panda", False)])
+def test_the_tab_says_where_the_controller_chooses_the_elbow(name: str, is_free: bool) -> None:
+    model, text, panel = load_model(name), Text("en"), CheckPanel(Text("en"), lambda request: None)
+    motion = plan_joint(model, model.home, model.home + 0.1, speed=0.3)
+    plan = build_plan_view(model, motion, check(motion, model))
+    assert text("check.free_elbow") not in panel._headline(plan, None, None, is_current=True)
+    plan = plan.completed("cartesian_position")
+    assert (text("check.free_elbow") in panel._headline(plan, None, None, is_current=True)) is is_free
 
 
 @pytest.mark.parametrize("phase", ["closed", "lost", "crashed"])

@@ -17,6 +17,10 @@ from rcilab.model.kinematics.solutions import Solutions
 from rcilab.model.robot_model import RobotModel
 
 Tone = Literal["good", "warn", "bad"]
+_NO_GOAL = ("reach.at_limit", "reach.beyond_limit", "reach.at_soft")
+"""Reasons why the arm may be there, but no motion can end there."""
+NO_SOLUTIONS = {"reach.tone.bad": "target.out_of_reach", "reach.tone.no_goal": "target.no_goal"}
+"""Key of the text in place of the list of solutions, by that of the verdict's first words."""
 
 POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
 """Names of the fields of a pose."""
@@ -192,6 +196,13 @@ def evaluate_joints(model: RobotModel, q: JointVector) -> TargetStatus:
     except KinematicsError:
         solutions = None
     return _evaluate_configuration(model, q, solutions)
+
+
+def verdict_lead(tone: Tone, why: Message) -> str:
+    """Returns the key of the words before the reason of a verdict."""
+    first = why.values.get("first", why)
+    is_no_goal = isinstance(first, Message) and first.code in _NO_GOAL
+    return "reach.tone.no_goal" if is_no_goal else f"reach.tone.{tone}"
 
 
 def why_not(refusal: UnreachableError, missed: float) -> Message:

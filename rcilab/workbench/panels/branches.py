@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app.goal.goal import NEAR_LIMIT, distinguishing_joints, margin
+from rcilab.app.goal.goal import NEAR_LIMIT, NO_SOLUTIONS, distinguishing_joints, margin, verdict_lead
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc
 
@@ -38,7 +38,8 @@ class BranchesPanel:
     def _html(self, state: UiState, arm: np.ndarray | None) -> str:
         solutions, text = state.goal.reach.solutions, self._text
         if solutions is None or not len(solutions):
-            code = "target.out_of_reach" if state.goal.reach.tone == "bad" else "target.no_branches"
+            reach = state.goal.reach
+            code = NO_SOLUTIONS.get(verdict_lead(reach.tone, reach.reason), "target.no_branches")
             return f'<p class="rl-note">{esc(text(code))}</p>'
         here = state.goal.q if arm is None else arm
         order = nearest_first(np.asarray(list(solutions)), here)

@@ -11,6 +11,7 @@ from rcilab.app.check.report_rows import count_unheeded
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import is_plan_current
 from rcilab.app.text import Text
+from rcilab.conformance.free_elbow import leaves_elbow_free
 from rcilab.conformance.time_scaling import can_slow_down_help
 from rcilab.i18n.translator import Message, with_space
 from rcilab.workbench.panels.check_rows import rows_html
@@ -107,6 +108,8 @@ class CheckPanel:
             headline = ("bad", "", made, sentence)
         tone, sign, word, rest = headline
         note = text("check.note") if plan.complete else text("check.incomplete")
+        if leaves_elbow_free(plan.model, plan.mode) and not plan.is_recorded:
+            note = "".join(with_space(note, text("check.free_elbow")))
         if aside is not None:
             tone, rest = "warn" if report.ok else tone, f"{rest} {text.render(aside)}"
         lead, rest = with_space(sign + text(word), rest)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app.goal.goal import NEAR_LIMIT
+from rcilab.app.goal.goal import NEAR_LIMIT, verdict_lead
 from rcilab.app.goal.goal_actions import MoveJoint
 from rcilab.app.jog.jog_actions import SetJog
 from rcilab.app.jog.jog_state import AXES, FASTEST_JOINT, FASTEST_TOOL, FRAMES, STEPS, HoldJog, PressJog, no_jog
@@ -201,7 +201,7 @@ def problems_html(state: UiState, text: Text, fields: list[tuple[str, str]]) -> 
 def reach_html(state: UiState, text: Text) -> str:
     """Returns the status of the target, with its tone as a word and as a sign."""
     tone, why = goal_verdict(state)
-    lead, reason = with_space(text("reach.tone." + tone), text.render(why))
+    lead, reason = with_space(text(verdict_lead(tone, why)), text.render(why))
     return f'<p class="rl-verdict rl-{tone}"><b>{esc(lead)}</b>{esc(reason)}</p>'
 
 

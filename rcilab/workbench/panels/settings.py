@@ -64,7 +64,9 @@ class SettingsPanel:
             )
             on_press(self._take, ask, lambda page: TakeControls(page=page))
             allow_spectators(self._take)
-        source = explain_limit(state.model.limits.source("joint.velocity"), text.language)
+        limits = state.model.limits
+        sources = dict.fromkeys(limits.source(f"joint.{name}") for name in ("velocity", "acceleration"))
+        source = "; ".join(explain_limit(source, text.language) for source in sources)
         gui.add_html(f'<p class="rl-note">{esc(text("settings.limits", source=source))}</p>')
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.app.goal.goal import verdict_lead
 from rcilab.app.goal.goal_actions import MoveTarget
 from rcilab.app.setup.configuration_state import goal_verdict
 from rcilab.app.text import Text
@@ -109,7 +110,7 @@ class GoalView:
         if tone != self._tone:
             self._tone = tone
             self._mark.color = TONE_COLORS[self._tone]
-        lead = text("reach.tone." + tone)
+        lead = text(verdict_lead(tone, why))
         sentence = text("reach.label") if tone == "good" else "".join(with_space(lead, text.render(why)))
         sentence = folded(text("target.handles", verdict=sentence))
         if sentence != self._sentence:

@@ -289,15 +289,17 @@ class FciController:
         self.ignored += not self.arm.receive(_as_command(packet, self._motion, self.version))
 
     def begin_move(self, request: Move) -> Status:
-        """Begins a motion; returns MOTION_STARTED, or why it is refused."""
+        """Begins a motion; returns MOTION_STARTED, or the status of its refusal.
+
+        Raises:
+            InvalidValueError: An argument is not valid.
+        """
         refusal = MOVE_REFUSALS.get(self.phase)
         if refusal is not None:
             return refusal
         is_ideal = self.arm.plant.kind == "ideal"
         motion = motion_of(request, self.version, self.settings, follows_exactly=is_ideal)
         deviations = PoseDeviations.of(request)
-        if motion is None or not deviations.are_valid:
-            return Status.INVALID_ARGUMENT
         if motion.mode.is_cartesian and self._is_singular():
             return Status.START_SINGULAR
         self.outcome, self._motion = None, motion

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rcilab.core.errors import DecodeError, ModelError, UsageError
+from rcilab.core.errors import DecodeError, InvalidValueError, ModelError, UsageError
 from rcilab.makers.franka.bounds import CLIENT_PORT
 from rcilab.makers.franka.controller.fci_controller import FciController
 from rcilab.makers.franka.controller.hand_server import HAND_PORT, HandServer
@@ -220,10 +220,10 @@ class FciServer:
         controller, kind = self.controller, type(request)
         match request:
             case Move():
-                status = controller.begin_move(request)
+                status, why = self._begin_move(request)
                 if status is Status.MOTION_STARTED:
                     self._move = kind, command_id
-                self._answer(kind, command_id, status)
+                self._answer(kind, command_id, status, why)
             case StopMove():
                 self._answer(kind, command_id, controller.stop_move())
             case AutomaticErrorRecovery():
@@ -243,6 +243,12 @@ class FciServer:
                 self._answer(kind, command_id, status, why)
             case _:
                 self._link.drop(peer, f"sent {kind.__name__} in the wrong place")
+
+    def _begin_move(self, request: Move) -> tuple[Status, str]:
+        try:
+            return self.controller.begin_move(request), ""
+        except InvalidValueError as error:
+            return Status.INVALID_ARGUMENT, str(error)
 
     def _send_library(self, command_id: int, architecture: int, system: int) -> None:
         models = self._models

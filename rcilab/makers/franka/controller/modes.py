@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
+from rcilab.core.errors import InvalidValueError
 from rcilab.core.state import ControllerMode, MotionGeneratorMode
 from rcilab.makers.franka.bounds import JOINT_STIFFNESS
 from rcilab.makers.franka.controller.settings import Settings
@@ -64,8 +65,8 @@ class MotionKind(NamedTuple):
         return _CONTROLLERS[ControlLaw.POSITION if self.is_stiff else self.mode.law][self.mode.is_cartesian]
 
 
-def motion_of(request: Move, version: FciVersion, settings: Settings, *, follows_exactly: bool) -> MotionKind | None:
-    """Returns the motion of a Move; None if its modes are not of this version, or do not go together.
+def motion_of(request: Move, version: FciVersion, settings: Settings, *, follows_exactly: bool) -> MotionKind:
+    """Returns the motion of a Move.
 
     Args:
         request: The request.
@@ -73,17 +74,25 @@ def motion_of(request: Move, version: FciVersion, settings: Settings, *, follows
         settings: The client's settings.
         follows_exactly: Whether the joints are on their servos, and yield to nothing, with the stiffness after
             power-up.
+
+    Raises:
+        InvalidValueError: Its modes are not of this version, or do not go together.
     """
     controllers, generators = tuple(MoveController), version.generators
-    if request.controller_mode >= len(controllers) or request.motion_generator_mode not in tuple(generators):
-        return None
+    if request.controller_mode >= len(controllers):
+        raise InvalidValueError("controller mode", request.controller_mode, f"must be 0 to {len(controllers) - 1}")
+    if request.motion_generator_mode not in tuple(generators):
+        known = f"must be 0 to {len(generators) - 1} in version {version.number}"
+        raise InvalidValueError("motion generator mode", request.motion_generator_mode, known)
     controller, generator = controllers[request.controller_mode], MoveGenerator(request.motion_generator_mode)
     if generator is MoveGenerator.NONE and controller is not MoveController.EXTERNAL:
-        return None
+        raise InvalidValueError("motion generator mode", int(generator), "commands torques: it needs controller mode 2")
     kind, velocity = _KINDS[generator], ()
     if isinstance(request, AsyncMove) and request.is_asynchronous:
-        if generator is not MoveGenerator.JOINT_POSITION or not all(0.0 < v < inf for v in request.largest_velocity):
-            return None
+        if generator is not MoveGenerator.JOINT_POSITION:
+            raise InvalidValueError("motion generator mode", int(generator), "has no asynchronous motions, only 0 has")
+        if not all(0.0 < v < inf for v in request.largest_velocity):
+            raise InvalidValueError("maximum velocity", request.largest_velocity, "must be above 0 and finite [rad/s]")
         kind, velocity = CommandKind.JOINT_GOALS, request.largest_velocity
     law = ControlLaw.TORQUE
     is_stiff = controller is MoveController.JOINT_IMPEDANCE and settings.joint_stiffness == JOINT_STIFFNESS

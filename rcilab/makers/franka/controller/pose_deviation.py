@@ -9,6 +9,7 @@ from __future__ import annotations
 from math import dist, hypot, pi, remainder, tau
 from typing import NamedTuple
 
+from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import rotation_between
 from rcilab.i18n.translator import Remark
 from rcilab.makers.franka.wire.requests import Move, Numbers
@@ -26,13 +27,16 @@ class PoseDeviations(NamedTuple):
 
     @classmethod
     def of(cls, request: Move) -> PoseDeviations:
-        """Returns those of a Move."""
-        return cls(request.path_deviation, request.goal_deviation)
+        """Returns those of a Move.
 
-    @property
-    def are_valid(self) -> bool:
-        """Whether each is zero or more."""
-        return all(bound >= 0.0 for bound in (*self.path, *self.goal))  # False for NaN.
+        Raises:
+            InvalidValueError: One of them is not zero or more.
+        """
+        found = cls(request.path_deviation, request.goal_deviation)
+        for name, bounds in zip(("path", "goal"), found, strict=True):
+            if not all(bound >= 0.0 for bound in bounds):  # Also for NaN.
+                raise InvalidValueError(f"{name} deviation", bounds, "must be 0 or more [m, rad, rad]")
+        return found
 
 
 def find_deviation(signals: CycleSignals, bounds: Numbers) -> Remark | None:

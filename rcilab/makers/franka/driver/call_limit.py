@@ -43,7 +43,7 @@ class CallLimit:
             command = [sys.executable, "-I", "-S", os.fspath(_SCRIPT), str(memory), str(os.getpid()), host, str(port)]
             self._process = subprocess.Popen(
                 command,
-                stdin=messages,
+                stdin=messages.fileno(),
                 pass_fds=(memory,),
                 start_new_session=True,  # Ctrl-C in a terminal is for this process only.
             )

@@ -15,6 +15,7 @@ from rcilab.core.errors import ConnectionLostError
 from rcilab.makers.address import ControllerAddress
 from rcilab.makers.network import find_route, no_robot_error
 
+_SILENCE = 0.5  # [s] After which a controller that ends no connection counts as waiting for a request. A tuning value.
 _CONNECT = Struct("<IIIHH")
 _ANSWER = Struct("<IIIBH")
 
@@ -57,13 +58,31 @@ def find_version(address: ControllerAddress, version: int, timeout: float) -> in
             raise ConnectionLostError(
                 f"{address}: what is there accepted the connection and did not answer within {timeout:g} s; check "
                 "that it is a Franka controller and that it has started, and connect again"
-            ) from error
+            ).coded("other_protocol", address=str(address)) from error
         except OSError as error:
+            how = f"ended the connection before its first answer ({error.strerror or error})"
+            if _ends_at_once(route.host, address.port):
+                raise ConnectionLostError(
+                    f"{address}: the controller {how}, probably because another client is connected: it takes one at "
+                    "a time; close that one and connect again"
+                ).coded("other_client", address=str(address)) from error
             raise ConnectionLostError(
-                f"{address}: the controller ended the connection before its first answer ({error.strerror or error}), "
-                "probably because another client is connected: it takes one at a time; close that one and connect again"
-            ) from error
+                f"{address}: what is there {how}; check that it is a Franka controller with FCI activated in Desk"
+            ).coded("other_protocol", address=str(address)) from error
     return found
+
+
+def _ends_at_once(host: str, port: int) -> bool:
+    """Returns whether a controller ends a connection over which nothing was sent: it has another client."""
+    with socket.socket() as tcp:
+        tcp.settimeout(_SILENCE)
+        try:
+            tcp.connect((host, port))
+            return not tcp.recv(1)
+        except TimeoutError:
+            return False
+        except OSError:
+            return True
 
 
 def _receive(tcp: socket.socket, size: int, deadline: float) -> bytes:

@@ -12,6 +12,7 @@ from rcilab.core.errors import ModelError
 from rcilab.core.optional_deps import require_library
 
 _LIBRARIES = {5: ("panda_py.libfranka", "Panda"), 10: ("pylibfranka", "FR3")}
+_PACKAGES = {5: "panda-python", 10: "pylibfranka"}
 _NO_WHEEL = (3, 13)
 """First version of Python without a pylibfranka."""
 _LARGEST_VERSION = 255
@@ -50,7 +51,7 @@ def load_client_library(version: int) -> Any:
     if version == 10 and sys.version_info >= _NO_WHEEL:
         purpose += " (with Python 3.12 or older: later ones have no pylibfranka)"
     with kept_scheduling():
-        return require_library(name, purpose, "franka")
+        return require_library(name, purpose, "franka", _PACKAGES[version])
 
 
 @contextmanager

@@ -70,12 +70,12 @@ def franka_limits(
         rotation: The same of its rotation, [rad/s, ...].
         elbow: The same of joint 3, [rad/s, ...].
         near_ends: How the joints' velocities decrease towards the ends of their ranges; None: they do not.
-        sources: Sources of the groups "joint", "translation", "rotation" and "elbow", and of "near_ends" if there are
-            such bounds.
+        sources: Sources of the groups "joint", "translation", "rotation" and "elbow", of "near_ends" if there are such
+            bounds, and of single bounds with another source, such as "joint.lower".
     """
     joint: dict[str, Any] = {name: readonly_copy(row) for name, row in table.items()}
     joint |= {name: readonly_copy([value] * 7) for name, value in _SETTINGS.items()}
-    of_joints = {f"joint.{name}": sources["joint"] for name in joint}
+    of_joints = {f"joint.{name}": sources.get(f"joint.{name}", sources["joint"]) for name in joint}
     of_tool = {f"cartesian.{kind}_{name}": sources[kind] for kind in ("translation", "rotation") for name in _RATES}
     of_elbow = {f"arm_angle.{name}": f"{sources['elbow']}; the arm angle is the elbow's" for name in _RATES}
     if near_ends is not None:

@@ -15,7 +15,7 @@ from rcilab.makers.franka.robots.arm import build_franka, craig_link, franka_lim
 from rcilab.makers.franka.state_rounding import ANGLE_ROUNDING
 
 LIMITS = "Franka's page Control parameters, limits for Franka Research 3"
-URDF = "URDF that an FR3 sends to its clients (that of the tests of the maker's client library)"
+URDF = "URDF of the FR3 in the tests of the maker's client library"
 PACKAGE = "maker's public description package 1.0.1, inertials of the FR3"
 
 _TABLE = {
@@ -129,7 +129,8 @@ DESCRIPTION = build_franka(
         elbow=(1.5, 10.0, 5000.0),
         near_ends=_NEAR_ENDS,
         sources={
-            "joint": f"{LIMITS}, joint space; ranges, velocities and torques: {URDF}",
+            "joint": f"{LIMITS}, joint space",
+            **dict.fromkeys(("joint.lower", "joint.upper", "joint.velocity", "joint.torque"), URDF),
             "near_ends": URDF,
             "translation": f"{LIMITS}, Cartesian space, Translation",
             "rotation": f"{LIMITS}, Cartesian space, Rotation",

@@ -193,6 +193,21 @@ def test_deviations_that_are_no_bounds_are_an_invalid_argument(robot: Robot, bou
 
 
 @pytest.mark.parametrize("version", [5, 10])
+def test_a_move_with_an_invalid_argument_is_refused_with_the_reason(version: int) -> None:
+    with fci_arena(version) as place, place.connect() as robot:
+        robot.try_move(3, wire.JOINT_POSITION)
+        robot.try_move(wire.JOINT_IMPEDANCE, 9)
+        robot.try_move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION, path=(0.1, -1.0, 0.1))
+        robot.skip(2)
+        invalid = "Move was answered: an argument is not valid;"
+        assert place.log("refused") == [
+            f"{invalid} controller mode must be 0 to 2, got 3",
+            f"{invalid} motion generator mode must be 0 to {4 if version == 10 else 3} in version {version}, got 9",
+            f"{invalid} path deviation must be 0 or more [m, rad, rad], got (0.1, -1.0, 0.1)",
+        ]
+
+
+@pytest.mark.parametrize("version", [5, 10])
 def test_bytes_after_a_request_are_ignored(version: int) -> None:
     with fci_arena(version) as place, place.connect() as robot:
         assert robot.ask("stop_move", b"more").status == "success"

@@ -114,12 +114,28 @@ def test_what_answers_there_and_is_no_controller_is_not_waited_for(answer):
             with peer:
                 peer.recv(64)
                 peer.sendall(answer)
+            again, _ = listener.accept()
+            again.recv(1)
+            again.close()
 
         thread = threading.Thread(target=serve)
         thread.start()
-        with pytest.raises(ConnectionLostError, match="ended the connection before its first answer"):
+        with pytest.raises(ConnectionLostError, match=r"what is there ended the connection .* is a Franka") as caught:
             find_version(address, 10, 2.0)
+        assert caught.value.code == "other_protocol"
         thread.join()
+
+
+def test_the_controller_of_another_maker_is_named():
+    controller = start_controller(
+        "xMatePro7", options=("--port", "1337", "--host", f"127.{os.getpid() % 200 + 20}.7.7")
+    )
+    try:
+        address = controller.address.partition("?")[0].replace("rci://", "fci://")
+        with pytest.raises(ConnectionLostError, match="if it is an arm of ROKAE, its address begins with rci://"):
+            connect(address)
+    finally:
+        controller.end()
 
 
 def test_a_controller_that_answers_too_slowly_is_not_waited_for():
@@ -193,12 +209,15 @@ def test_an_unknown_version_is_named(monkeypatch, version, sentence):
         thread.join()
 
 
-@pytest.mark.parametrize(("name", "library"), [("Panda", "panda_py"), ("FR3", "pylibfranka")])
-def test_a_missing_library_is_one_sentence(monkeypatch, name, library):
+@pytest.mark.parametrize(
+    ("name", "library", "package"),
+    [("Panda", "panda_py", "panda-python"), ("FR3", "pylibfranka", "pylibfranka")],
+)
+def test_a_missing_library_is_one_sentence(monkeypatch, name, library, package):
     for module in [module for module in sys.modules if module.split(".")[0] == library]:
         monkeypatch.delitem(sys.modules, module)
     monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(MissingExtraError, match=rf"driving the {name}.* needs {library}, which is not installed: pip"):
+    with pytest.raises(MissingExtraError, match=rf"driving the {name}.* needs {package}, which is not installed: pip"):
         connect("fci://127.9.9.9", load_model(name))
 
 
