@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rcilab.core.arrays import Array
 from rcilab.core.spatial import Pose
 from rcilab.makers.ufactory.bounds import JOINT_ACCELERATION, JOINT_VELOCITY, TOOL_ACCELERATION
 from rcilab.makers.ufactory.controller.xarm_controller import XArmController
@@ -140,13 +141,16 @@ def tool_speed_mm(controller: XArmController) -> float:
     return (x * x + y * y + z * z) ** 0.5 / MILLIMETRE
 
 
-def _twist_mm(twist: Sequence[float]) -> list[float]:
-    return [value / MILLIMETRE for value in twist[:3]] + list(twist[3:])
+def _twist_mm(twist: Sequence[float], R: Array) -> list[float]:
+    """Returns a twist, or its derivative, in the axes of the user frame."""
+    linear, angular = R @ twist[:3] / MILLIMETRE, R @ twist[3:]
+    return [*linear.tolist(), *angular.tolist()]
 
 
 def _high_rate(controller: XArmController) -> dict[str, ReportValue]:
     commanded, tool_c, measured, tool, _, _, wrench = controller.arm.signals
     user, signals = controller.settings.T_base_user.inverse(), controller.signals
+    R = user.rotation
     q_c, dq_c, ddq_c = commanded.arrays
     box_in, box_out = ([round(1e3 * 10.0 * code / 4095.0) for code in codes] for codes in (
         signals.analog_inputs, signals.analog_outputs
@@ -159,14 +163,15 @@ def _high_rate(controller: XArmController) -> dict[str, ReportValue]:
         "target_ddq": padded(ddq_c.tolist()),
         "q": padded(measured.q.tolist()),
         "dq": padded(measured.dq.tolist()),
+        "ddq": padded(controller.accelerations.joints),
         "joint_torque": padded(measured.tau.tolist()),
         "target_pose_aa": pose_as_mm_rotation(user @ tool_c.pose),
-        "target_twist": _twist_mm(tool_c.twist),
+        "target_twist": _twist_mm(tool_c.twist, R),
         "pose_aa": pose_as_mm_rotation(user @ tool.pose),
-        "twist": _twist_mm(tool.twist),
+        "twist": _twist_mm(tool.twist, R),
         "tcp_wrench": wrench.tolist(),
-        "target_tcp_acceleration": _twist_mm(tool_c.acceleration),
-        "tcp_acceleration": _twist_mm(tool.acceleration),
+        "target_tcp_acceleration": _twist_mm(tool_c.acceleration, R),
+        "tcp_acceleration": _twist_mm(controller.accelerations.tool, R),
         "inputs": signals.box_inputs,
         "outputs": signals.box_outputs,
         "analog_inputs": box_in,

@@ -25,6 +25,7 @@ from rcilab.core.state import RobotState
 from rcilab.i18n.translator import Remark
 from rcilab.makers.ufactory.bounds import JOINT_VELOCITY, SERVO_PERIOD, SERVO_SPEED_FACTOR
 from rcilab.makers.ufactory.controller.gripper import Gripper
+from rcilab.makers.ufactory.controller.measured_accelerations import MeasuredAccelerations
 from rcilab.makers.ufactory.controller.modes import (
     SET_PAUSED,
     SET_READY,
@@ -107,6 +108,7 @@ class XArmController:
         settings: All settings.
         signals: Digital and analog signals.
         gripper: The gripper at the tool.
+        accelerations: Those of the measured arm.
         mode: The mode.
         error: The error that is set, or None.
         warning: The warning that is set, or None.
@@ -132,6 +134,7 @@ class XArmController:
         self.arm = arm
         self.settings = Settings.of_arm(arm.model.description)
         self.signals, self.gripper = Signals(), Gripper()
+        self.accelerations = MeasuredAccelerations(arm.measured_state)
         self.mode = Mode.POSITION
         self.error: UfactoryError | None = None
         self.warning: UfactoryWarning | None = None
@@ -457,6 +460,7 @@ class XArmController:
         self._update_arm()
         self._choose_control_law()
         events, command_violations, measured_violations = self._feed.step()
+        self.accelerations.step(self.arm.measured_state)
         self._handle_events(events)
         if command_violations or measured_violations:
             self._raise(command_violations or measured_violations)

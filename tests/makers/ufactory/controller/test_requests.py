@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import struct
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.spatial import Pose
 from rcilab.makers.ufactory.controller.gripper import OPEN
 from rcilab.makers.ufactory.controller.modes import Mode
@@ -320,6 +322,29 @@ def test_reports_come_at_their_rates_and_are_true(arm: Arm) -> None:
     rich, at = sent[RICH][-1], RICH.offsets["pose"]
     np.testing.assert_allclose(struct.unpack("<6f", rich[at : at + 24]), arm.pose, rtol=1e-5, atol=1e-4)
     assert (rich[87], rich[88], rich[145], rich[146]) == (0x3F, 0x3F, 6, 6)
+
+
+def test_the_report_in_real_time_has_the_motion_of_joints_and_tool(arm: Arm) -> None:
+    arm.call(Function.SET_WORLD_OFFSET, "6f", 100.0, 0.0, 0.0, 0.0, 0.0, 0.7)
+    arm.call(Function.SET_STATE, "B", 0)
+    peer = arm.join(1 + REPORTS.index(HIGH_RATE))
+    arm.move_joints([x + 0.5 for x in Q6])
+    arm.run()
+
+    def column(name: str, count: int) -> np.ndarray:
+        at = HIGH_RATE.offsets[name]
+        return np.array([struct.unpack(f"<{count}f", report[at : at + 4 * count]) for report in arm.link.sent[peer]])
+
+    fastest = {}
+    for names in (("q", "dq", "ddq"), ("target_q", "target_dq", "target_ddq"), ("pose_aa", "twist", "tcp_acceleration"),
+                  ("target_pose_aa", "target_twist", "target_tcp_acceleration")):  # fmt: skip
+        count = 6 if "q" in names[0] else 3  # Rotation vectors are not the integral of a rotation velocity.
+        for value, rate in pairwise(column(name, count) for name in names):
+            middle = (value[2:] - value[:-2]) / (2 * 5 * CYCLE_TIME)
+            largest = np.abs(rate).max()
+            assert np.abs(rate[1:-1] - middle).max() < 0.1 * largest
+            fastest[names] = largest
+    assert min(fastest.values()) > 1.0
 
 
 def test_clients_that_leave_are_forgotten(arm: Arm) -> None:
