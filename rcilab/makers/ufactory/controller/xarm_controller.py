@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from math import hypot, inf
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
-from rcilab.conformance.common_conditions import VELOCITY_ALLOWANCE
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.errors import UsageError
 from rcilab.core.fault import FaultCode
@@ -23,7 +22,7 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
 from rcilab.i18n.translator import Remark
-from rcilab.makers.ufactory.bounds import JOINT_VELOCITY, SERVO_PERIOD, SERVO_SPEED_FACTOR
+from rcilab.makers.ufactory.bounds import SERVO_PERIOD
 from rcilab.makers.ufactory.controller.gripper import Gripper
 from rcilab.makers.ufactory.controller.measured_accelerations import MeasuredAccelerations
 from rcilab.makers.ufactory.controller.modes import (
@@ -38,9 +37,10 @@ from rcilab.makers.ufactory.controller.modes import (
     State,
     answer,
 )
+from rcilab.makers.ufactory.controller.motion_watch import GuidingWatch, MotionWatch
 from rcilab.makers.ufactory.controller.neutral_state import build_neutral_state
 from rcilab.makers.ufactory.controller.queue_end import QueueEnd
-from rcilab.makers.ufactory.controller.settings import MILLIMETRE, Settings, apply_setup
+from rcilab.makers.ufactory.controller.settings import Settings, apply_setup
 from rcilab.makers.ufactory.controller.signals import Signals
 from rcilab.makers.ufactory.errors import UfactoryError, UfactoryWarning
 from rcilab.model.robot_model import RobotModel
@@ -59,7 +59,6 @@ from rcilab.sim.planner import (
     RefusalReason,
     Target,
 )
-from rcilab.sim.self_collision import SelfCollisionWatch
 from rcilab.sim.violations import ArmCondition, Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 
@@ -77,10 +76,6 @@ LARGEST_QUEUE = 2048  # Motions; the client library itself waits from 512 or 102
 ALL_AXES = 8
 _SERVO_CYCLES = round(1e3 * SERVO_PERIOD)
 _SERVO_BURST = 2  # Commands that may come at once, so that a client of 250 Hz with jitter loses none.
-_OVERLOAD_CYCLES = 100  # That a drive may be at its largest torque; a tuning value.
-_DETECTION_CYCLES = 300  # After the start of mode 2, before a hand reaches the arm; a tuning value.
-_DETECTION_SPEED = 0.2  # [rad/s] Which an arm with half a kilogram more than its load exceeds in this time.
-_SPEED_MARGIN = 1.001  # Rounding of the planner's differences.
 _BUTTONS: dict[SafetyButton, UfactoryError] = {
     "estop": UfactoryError.EMERGENCY_STOP_BUTTON,
     "gstop": UfactoryError.EMERGENCY_STOP_INPUT,
@@ -154,12 +149,8 @@ class XArmController:
         self._is_outdated = False  # Settings have changed that the arm has not yet.
         self._was_following = False
         self._is_guided = False
-        self._detects_motion = True  # At the start of mode 2.
-        self._guided_for = 0  # Cycles.
         self._number = 0
         self._tokens = float(_SERVO_BURST)
-        self._last_excess = 0.0
-        self._overload = 0
         self._online: int | None = None  # Task of the on-line command in progress.
         self._all = (1 << arm.model.n) - 1
         arm.set_prefill(0)
@@ -167,7 +158,7 @@ class XArmController:
         self.planner = Planner(arm.model, self.motion_limits, arm.commanded.q, slows_down=False)
         self._feed = PlannerFeed(arm, self.planner, self._checked_limits)
         self.end = QueueEnd(arm.model, arm.commanded.q)
-        self._links = SelfCollisionWatch(arm.model)
+        self._motion_watch, self._guiding_watch = MotionWatch(arm), GuidingWatch(arm)
         self.robot_state = build_neutral_state(self)
 
     @property
@@ -312,7 +303,7 @@ class XArmController:
         self.planner.configure(self.model, self.motion_limits)
         self._feed.limits = self._checked_limits
         self.end = QueueEnd(self.model, self.planner.q)
-        self._links = SelfCollisionWatch(self.model)
+        self._motion_watch.configure()
 
     def reset_state(self) -> None:
         """Sets the state after a change of mode or settings: nothing moves until it is set to 0."""
@@ -344,7 +335,7 @@ class XArmController:
         """
         if number not in tuple(Mode):
             return False
-        self._detects_motion = detects_motion
+        self._guiding_watch.detects_motion = detects_motion
         if number != self.mode:
             self.mode = Mode(number)
             self.reset_state()
@@ -465,7 +456,9 @@ class XArmController:
         if command_violations or measured_violations:
             self._raise(command_violations or measured_violations)
         elif self._is_guided:
-            self._watch_guiding()
+            found = self._guiding_watch.step()
+            if found is not None:
+                self.fail(*found)
         else:
             self._watch()
         if self._set_state is State.STOPPING and self.planner.state is not PlannerState.MOVING:
@@ -482,7 +475,7 @@ class XArmController:
         if is_guided and not self._is_guided:
             self._feed.abort()
             self.arm.begin_guiding(FREE)
-            self._guided_for = 0
+            self._guiding_watch.begin()
         self._is_guided = is_guided
         held = ControlLaw.POSITION if self.has_motors else ControlLaw.BRAKED
         self.arm.resting_law = ControlLaw.GUIDE if is_guided else held
@@ -508,74 +501,15 @@ class XArmController:
             return
         if not self._was_following:
             self._was_following = True
-            self._links.begin(self.arm.signals.measured.q)
-            self._last_excess = self._excess()
-            self._overload = 0
-        if self.planner.state is PlannerState.MOVING:
-            self._check_motion()
-        else:
+            self._motion_watch.begin(self.settings)
+        if self.planner.state is not PlannerState.MOVING:
             self._end_online(EventKind.REACHED)
-
-    def _watch_guiding(self) -> None:
-        """Checks the speed of the guided joints, which is small before a hand reaches the arm."""
-        self._guided_for += 1
-        dq = np.abs(self.arm.signals.measured.dq)
-        joint, speed = int(dq.argmax()) + 1, float(dq.max())
-        error, bound = UfactoryError.MEASURED_SPEED, VELOCITY_ALLOWANCE * JOINT_VELOCITY
-        if self._detects_motion and self._guided_for <= _DETECTION_CYCLES:
-            error, bound = UfactoryError.MANUAL_MODE, _DETECTION_SPEED
-        if speed > bound:
-            text = f"joint {joint}: its speed of {speed:.3g} rad/s in mode 2 is above {bound:.3g} rad/s"
-            remark = Remark(text, "guided_speed", joint=joint, value=speed, bound=bound, unit="rad/s")
-            self.fail(error, remark)
-
-    def _excess(self) -> float:
-        """Returns how far the commanded tool is outside the boundary, [mm]; 0 inside, or without one."""
-        settings = self.settings
-        if not settings.fence:
-            return 0.0
-        bounds, position = settings.boundary, self.arm.tool_c.position
-        return max(
-            0.0,
-            *(max(x / MILLIMETRE - bounds[2 * k], bounds[2 * k + 1] - x / MILLIMETRE) for k, x in enumerate(position)),
+            return
+        found = self._motion_watch.step(
+            self.settings, is_servo=self.mode is Mode.SERVO, is_blocked=self.planner.is_blocked
         )
-
-    def _check_motion(self) -> None:
-        excess, before = self._excess(), self._last_excess
-        self._last_excess = excess
-        if excess > before:
-            text = f"the tool is {excess:.2g} mm outside the safety boundary"
-            self.fail(
-                UfactoryError.SAFETY_BOUNDARY, Remark(text, "outside_boundary", value=MILLIMETRE * excess, unit="m")
-            )
-            return
-        if self.mode is Mode.SERVO:
-            speed = hypot(*self.arm.tool_c.twist[:3])
-            bound = self.model.limits.joint_tool_velocity * self.settings.servo_speed_factor / SERVO_SPEED_FACTOR
-            if speed > bound * _SPEED_MARGIN:
-                text = f"the tool would move with {speed:.3g} m/s, faster than {bound:g} m/s"
-                remark = Remark(text, "servo_speed", value=speed, bound=bound, unit="m/s")
-                self.fail(UfactoryError.SERVO_LINEAR_SPEED, remark)
-                return
-        if self.planner.is_blocked:
-            text = "the tool cannot move on with this velocity: it is at the end of its reach, or at a singular pose"
-            self.fail(UfactoryError.KINEMATICS, Remark(text, "twist_blocked"))
-            return
-        if self.settings.self_collision:
-            touching = self._links.step(self.arm.signals.measured.q)
-            if touching is not None:
-                self.fail(UfactoryError.SELF_COLLISION, touching)
-                return
-        self._check_drives()
-
-    def _check_drives(self) -> None:
-        """Raises the error of a joint whose drive has been at its largest torque for a while."""
-        torque = np.abs(self.arm.signals.measured.tau) >= self.model.limits.joint.torque
-        self._overload = self._overload + 1 if torque.any() else 0
-        if self._overload >= _OVERLOAD_CYCLES:
-            joint = int(torque.argmax()) + 1
-            text = f"joint {joint}: the drive was at its largest torque for {_OVERLOAD_CYCLES} ms"
-            self.fail(UfactoryError(10 + joint), Remark(text, "overload", joint=joint, milliseconds=_OVERLOAD_CYCLES))
+        if found is not None:
+            self.fail(*found)
 
     def _pause(self) -> None:
         if self.mode is Mode.POSITION:
