@@ -23,7 +23,7 @@ import numpy as np
 
 from rcilab.core.arrays import JointVector
 from rcilab.model.robot_model import RobotModel
-from rcilab.sim.arm_parameters import ArmParameters
+from rcilab.sim.arm_parameters import UPRIGHT, ArmParameters
 from rcilab.sim.compliance import ModalDamping
 from rcilab.sim.force_frame import ForceAxes
 from rcilab.sim.hand_guiding import FREE, GuidedFreedom, guide_torque, wall_torque
@@ -144,7 +144,11 @@ class Actuator:
                 damper=self._damper,
             )
         damping = parameters.guide_damping
-        return guide_torque(model, measured, self._freedom, self._T_held, self._soft_limits, self._q3_held, damping)
+        torque = guide_torque(model, measured, self._freedom, self._T_held, self._soft_limits, self._q3_held, damping)
+        if parameters.gravity == UPRIGHT:
+            return torque
+        body, q = model.rigid_body, measured.q
+        return torque + body.tilted_gravity(q, parameters.gravity) - body.gravity(q)
 
 
 def _approach(wrench: tuple[float, ...], desired: tuple[float, ...]) -> tuple[float, ...]:

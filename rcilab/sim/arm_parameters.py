@@ -16,6 +16,9 @@ from rcilab.sim.filters import SAMPLING_RATE
 
 Floats = tuple[float, ...]
 
+UPRIGHT = (0.0, 0.0, -1.0)
+"""Direction of gravity in base of an arm that stands upright."""
+
 
 class ForceAxesKind(Enum):
     """Directions of the axes of the force-control frame."""
@@ -65,6 +68,8 @@ class ArmParameters:
     """Whether walls push the tool back into the active safety box while the arm is compliant."""
     guide_damping: float = 1.0
     """Factor on the damping of a guided arm."""
+    gravity: Floats = UPRIGHT
+    """Direction of gravity in base for which a guided arm is compensated; the arm itself stands upright."""
     auto_limit: bool = False
     """Whether commanded joint angles are stopped inside the soft limits instead of violating them."""
 

@@ -216,6 +216,16 @@ class RigidBody:
         """Returns g(q), shape (n,), [N m]."""
         return pin.computeGeneralizedGravity(self._model, self._data, q).copy()
 
+    def tilted_gravity(self, q: JointVector, direction: Sequence[float]) -> JointVector:
+        """Returns g(q) for an arm that does not stand upright, shape (n,), [N m].
+
+        Args:
+            q: Joint angles, shape (n,), [rad].
+            direction: Direction of gravity in base, a unit vector.
+        """
+        J = pin.jacobianCenterOfMass(self._model, self._data, q)
+        return -GRAVITY * float(self._data.mass[0]) * (J.T @ np.array(direction))
+
     def acceleration(self, q: JointVector, dq: JointVector, tau: JointVector) -> JointVector:
         """Returns the joint accelerations that torques cause (forward dynamics), shape (n,), [rad/s^2].
 

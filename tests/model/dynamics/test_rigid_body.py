@@ -37,6 +37,15 @@ def test_gravity_torque_is_the_slope_of_the_potential_energy(name):
     np.testing.assert_allclose(model.torque(q).gravity, slope, atol=1e-6)
 
 
+@pytest.mark.parametrize("name", ROBOT_NAMES)
+def test_gravity_of_a_tilted_arm_is_that_of_an_upright_one_along_its_direction(name):
+    model = load_model(name, load=Payload(mass=0.5, center_of_mass=(0.01, 0.02, 0.05)))
+    q, _, _ = random_state(model)
+    body = model.rigid_body
+    np.testing.assert_allclose(body.tilted_gravity(q, (0.0, 0.0, -1.0)), body.gravity(q), atol=1e-11)
+    assert abs(body.tilted_gravity(q, (0.0, 1.0, 0.0))[0]) > 1e-3  # Joint 1 is vertical.
+
+
 def potential_energy(model, q):
     """Energy from our own forward kinematics: a link turns as the Denavit-Hartenberg frame after its joint does."""
     zero, now = model.joint_frames(np.zeros(model.n)), model.joint_frames(q)

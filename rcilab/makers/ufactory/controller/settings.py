@@ -57,8 +57,6 @@ class Settings(ArmParameters):
 
     T_base_user: Pose = IDENTITY
     """Frame of poses in requests and reports (`set_world_offset`)."""
-    gravity: Floats = (0.0, 0.0, -1.0)
-    """Its direction in base; reported only: the arm stands upright."""
     collision_sensitivity: int = DEFAULT_SENSITIVITY
     """0: no collision is detected; 5: the smallest."""
     teach_sensitivity: int = DEFAULT_SENSITIVITY

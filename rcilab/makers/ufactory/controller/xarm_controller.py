@@ -67,6 +67,7 @@ _OF_THE_ARM = (
     "load",
     "collision_thresholds",
     "guide_damping",
+    "gravity",
     "reduced",
     "reduced_joint_speed",
     "reduced_lower",

@@ -310,3 +310,13 @@ def test_switched_off_motors_hold_the_arm_by_its_brakes() -> None:
     arm.step(500)
     np.testing.assert_allclose(arm.q, Q6, atol=1e-3)
     assert arm.call(Function.SET_BRAKE, "2B", 9, 0)[0] & STATUS_INVALID
+
+
+@pytest.mark.parametrize(("direction", "error"), [((0.0, 0.0, -2.0), 0), ((0.0, 0.0, 1.0), 37), ((0.0, 1.0, 0.0), 37)])
+def test_an_arm_that_is_compensated_for_another_mounting_moves_by_itself_in_mode_2(
+    arm: Arm, direction: tuple[float, float, float], error: int
+) -> None:
+    arm.call(Function.SET_GRAVITY_DIRECTION, "3f", *direction)
+    arm.ready(Mode.TEACH)
+    arm.step(400)
+    assert arm.error[0] == error
