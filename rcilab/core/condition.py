@@ -19,6 +19,7 @@ Stage: TypeAlias = Literal["throughout", "start", "end"]
 
 Signal: TypeAlias = Literal[
     "joint",
+    "joint_step",
     "torque",
     "position",
     "translation",
@@ -32,9 +33,10 @@ Signal: TypeAlias = Literal[
     "external_force",
     "lost_commands",
 ]
-"""The quantity of a condition: every joint's angle or torque; the tool's position, the norms of its translation and
-rotation; the arm angle; the tool's pose as a whole; the smallest distance between links, or from the floor; the sign
-of the elbow angle; external torques and force; commands that did not arrive."""
+"""The quantity of a condition: every joint's angle, its step from one command to the next, or its torque; the tool's
+position, the norms of its translation and rotation; the arm angle; the tool's pose as a whole; the smallest distance
+between links, or from the floor; the sign of the elbow angle; external torques and force; commands that did not
+arrive."""
 
 Bounds: TypeAlias = tuple[Array, Array]
 """Lower and upper bound, each of shape (n,) for joints and (1,) for anything else."""
@@ -98,7 +100,7 @@ class Condition:
     @property
     def is_per_joint(self) -> bool:
         """Whether every joint has its own value and bound."""
-        return self.signal in ("joint", "torque", "external_torque")
+        return self.signal in ("joint", "joint_step", "torque", "external_torque")
 
     @property
     def is_rate(self) -> bool:

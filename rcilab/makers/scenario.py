@@ -89,6 +89,10 @@ def _as_it_is(scene: Scene) -> Scene:
     return scene
 
 
+def _nothing(scene: Scene) -> None:
+    del scene
+
+
 def _at_home(model: RobotModel) -> JointVector:
     return model.home
 
@@ -101,10 +105,14 @@ class FaultScenario:
     group: Group
     mode: Mode
     """The command mode."""
-    act: Callable[[Scene], Callback]
-    """Returns the callback that provokes the fault."""
+    act: Callable[[Scene], Callback] | None = None
+    """Returns the callback that provokes the fault; None: a request does."""
+    request: Callable[[Scene], tuple[FaultCode, ...]] | None = None
+    """Sends a request that the controller refuses, and returns the errors that it then reports; None: `act` does it."""
     prepare: Callable[[Scene], Scene] = field(default=_as_it_is)
     """Prepares the scene: narrows a limit, softens the arm. The arm does not move."""
+    restore: Callable[[Scene], None] = field(default=_nothing)
+    """Takes back what `prepare` has set, beyond limits and parameters, which are always reset."""
     start: Callable[[RobotModel], JointVector] = field(default=_at_home)
     """Returns the initial joint angles, shape (n,), [rad]."""
     needs_elbow: bool = False
@@ -115,4 +123,5 @@ class FaultScenario:
     """Whether the network has to be repaired afterwards."""
 
     def __repr__(self) -> str:
-        return f"<FaultScenario {self.fault.manual_name}, commanded as {self.mode}>"
+        how = f"commanded as {self.mode}" if self.request is None else "by a refused request"
+        return f"<FaultScenario {self.fault.manual_name}, {how}>"

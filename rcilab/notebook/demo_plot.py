@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from rcilab.app.fault_lab.demo_view import AFTER_FAULT, MARGIN, seen_lower
-from rcilab.app.fault_lab.fault_demo import FaultDemo
+from rcilab.app.fault_lab.signals import FaultSignal
+from rcilab.core.arrays import Array
 from rcilab.notebook.style import esc
 from rcilab.notebook.svg_plot import BAD, LINE, SOFT, number, ticks
 
@@ -17,17 +18,18 @@ _NAME = 60.0  # Width of the time axis' name.
 _CURVE = "#0072B2"
 
 
-def draw_demo(demo: FaultDemo, title: str, time: str, factor: float = 1.0) -> str:
+def draw_signal(signal: FaultSignal, t: Array, title: str, time: str, factor: float = 1.0) -> str:
     """Returns the picture.
 
     Args:
-        demo: The demo.
+        signal: The quantity.
+        t: Time of its values, shape (N,), [s].
         title: Name of the curve.
         time: Name of the time axis.
         factor: From SI to the displayed unit.
     """
-    t, values = np.array(demo.cycles["t"]), factor * demo.signal.values
-    lower, upper = seen_lower(values, factor * demo.signal.lower), factor * demo.signal.upper
+    values = factor * signal.values
+    lower, upper = seen_lower(values, factor * signal.lower), factor * signal.upper
     known = np.isfinite(values)
     seen = [float(values[known].min()), float(values[known].max())]
     seen += [float(edge) for bound in (lower, upper) for edge in (bound.min(), bound.max()) if math.isfinite(edge)]
@@ -60,7 +62,7 @@ def draw_demo(demo: FaultDemo, title: str, time: str, factor: float = 1.0) -> st
     points = " ".join(f"{x(a):.1f},{y(b):.1f}" for a, b in zip(t[known].tolist(), values[known].tolist(), strict=True))
     out.append(f'<polyline points="{points}" fill="none" stroke="{_CURVE}" stroke-width="2"/>')
     if known[-1]:
-        out.append(f'<circle cx="{x(float(t[-1])):.1f}" cy="{y(factor * demo.value):.1f}" r="5" fill="{BAD}"/>')
+        out.append(f'<circle cx="{x(float(t[-1])):.1f}" cy="{y(factor * signal.value):.1f}" r="5" fill="{BAD}"/>')
     frame = f'<rect x="{_LEFT:g}" y="{_TOP:g}" width="{right - _LEFT:g}" height="{bottom - _TOP:g}" fill="none" '
     return "".join(out) + f'{frame}stroke="{LINE}"/></svg>'
 

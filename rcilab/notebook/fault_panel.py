@@ -6,6 +6,7 @@ from functools import partial
 from typing import Any
 
 import ipywidgets
+import numpy as np
 
 from rcilab.app.displayed_motion import display_fault
 from rcilab.app.fault_lab.demo_view import body_html, head_html
@@ -16,7 +17,7 @@ from rcilab.app.status_text import describe_remedy, explain_error
 from rcilab.core.errors import RcilabError
 from rcilab.core.fault import FaultCode, name_faults
 from rcilab.i18n.translator import Text, message
-from rcilab.notebook.demo_plot import draw_demo
+from rcilab.notebook.demo_plot import draw_signal
 from rcilab.notebook.flight_recorder import record_html
 from rcilab.notebook.long_task import LongTask
 from rcilab.notebook.part import Part
@@ -166,7 +167,10 @@ def _card_html(fault: FaultCode, text: Text) -> str:
 
 
 def _demo_html(demo: FaultDemo, text: Text) -> str:
-    factor = text.units.from_si(demo.condition.unit)[0]
-    picture = draw_demo(demo, text(f"condition.{demo.condition.id}"), text("plot.time"), factor)
+    signal, picture = demo.signal, ""
+    if signal is not None and signal.has_curve:
+        factor = text.units.from_si(signal.condition.unit)[0]
+        title = text(f"condition.{signal.condition.id}")
+        picture = draw_signal(signal, np.array(demo.cycles["t"]), title, text("plot.time"), factor)
     script = f"<details><summary>{esc(text('learn.script'))}</summary><pre>{esc(demo.script)}</pre></details>"
     return f"{head_html(demo, text)}{picture}{body_html(demo, text)}{script}"

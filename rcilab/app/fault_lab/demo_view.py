@@ -16,6 +16,9 @@ from rcilab.i18n.error_messages import describe_note
 
 if TYPE_CHECKING:
     from rcilab.app.fault_lab.fault_demo import FaultDemo
+    from rcilab.app.fault_lab.signals import FaultSignal
+    from rcilab.core.condition import Condition
+    from rcilab.i18n.locale import Language
     from rcilab.i18n.translator import Text
 
 AFTER_FAULT = 0.06  # Part of the recorded time that the curve continues after the fault, so that its mark is complete.
@@ -25,21 +28,28 @@ _NEAR = 0.5  # Share of the lower bound from which on it is shown: a distant bou
 
 def head_html(demo: FaultDemo, text: Text) -> str:
     """Returns the fault, what was sent, and which bound it violated."""
-    row = demo.condition
     others = [fault.manual_name for fault in demo.reported if fault is not demo.fault]
     also = f" {text('learn.also', faults=', '.join(others))}" if others else ""
-    value, bound = text.units.format_numbers(row.unit, demo.value, demo.bound)
+    sent = demo.describe("sent", text.language, text.units)
+    return (
+        f'<p class="rl-verdict rl-bad rl-big"><b>◆ {_breakable(demo.fault.manual_name)}</b> '
+        f"{escape(text('learn.reported', number=demo.fault.value))}{escape(also)}</p>"
+        f'<p class="rl-note"><b>{escape(text("learn.done"))}</b> {escape(sent)}</p>'
+        f"{'' if demo.signal is None else _signal_html(demo, demo.signal, text)}"
+    )
+
+
+def _signal_html(demo: FaultDemo, signal: FaultSignal, text: Text) -> str:
+    """Returns the title of the curve, the value and its bound."""
+    row = signal.condition
+    value, bound = text.units.format_numbers(row.unit, signal.value, signal.bound)
     unit = unit_name(row.unit, text)
     facts = text(
         "learn.number", value=value, bound=with_unit(bound, row.unit, text),
         time=f"{demo.time:.3f}", sample=demo.cycle,
     )  # fmt: skip
-    sent = demo.describe("sent", text.language, text.units)
-    place = text("check.joint", joint=demo.signal.axis) + " · " if demo.signal.axis else ""
+    place = text("check.joint", joint=signal.axis) + " · " if signal.axis else ""
     return (
-        f'<p class="rl-verdict rl-bad rl-big"><b>◆ {_breakable(demo.fault.manual_name)}</b> '
-        f"{escape(text('learn.reported', number=demo.fault.value))}{escape(also)}</p>"
-        f'<p class="rl-note"><b>{escape(text("learn.done"))}</b> {escape(sent)}</p>'
         f'<div class="rl-plot-title">{escape(text(f"condition.{row.id}"))} [{escape(unit or "1")}]</div>'
         f'<p class="rl-note rl-under">{escape(place)}{escape(facts)}</p>'
     )
@@ -47,26 +57,29 @@ def head_html(demo: FaultDemo, text: Text) -> str:
 
 def body_html(demo: FaultDemo, text: Text) -> str:
     """Returns legend, cause, remedy, condition and recovery."""
-    language, row = text.language, demo.condition
+    language = text.language
     steps = "".join(f"<li>{escape(step)}</li>" for step in demo.recovery_steps(language))
     executed = f'<span class="rl-dim">{escape(text("learn.executed"))}</span>'
     legend = "".join(
         f'<span class="rl-sign-{sign}">{escape(text(f"learn.legend.{sign}"))}</span>' for sign in ("limit", "fault")
     )
-    source, manual = explain_source(row, language), f"manual.{demo.fault.maker}"
+    manual = f"manual.{demo.fault.maker}"
     rows = (
         ("learn.cause", escape(demo.describe("explanation", language, text.units))),
         ("learn.remedy", escape(demo.describe("prevention", language, text.units))),
-        (
-            "learn.condition",
-            f"{escape(explain_formula(row, language))}<br><span class='rl-dim'>{escape(source)}</span>",
-        ),
+        *(() if demo.condition is None else (("learn.condition", _condition_html(demo.condition, language)),)),
         *((("learn.manual", escape(text(manual, number=demo.fault.value))),) if text.has(manual) else ()),
         ("learn.way_out", f'<ol class="rl-steps-out">{steps}</ol>{executed}'),
         ("learn.said", f"<code>{escape(text.render(describe_note(demo.sentence)))}</code>"),
     )
     table = "".join(f"<tr><th>{escape(text(key))}</th><td>{cell}</td></tr>" for key, cell in rows)
-    return f'<div class="rl-legend">{legend}</div><table class="rl-table rl-facts-table rl-demo">{table}</table>'
+    shown = f'<div class="rl-legend">{legend}</div>' if demo.signal is not None and demo.signal.has_curve else ""
+    return f'{shown}<table class="rl-table rl-facts-table rl-demo">{table}</table>'
+
+
+def _condition_html(row: Condition, language: Language) -> str:
+    source = escape(explain_source(row, language))
+    return f"{escape(explain_formula(row, language))}<br><span class='rl-dim'>{source}</span>"
 
 
 def seen_lower(values: Array, lower: Array) -> Array:

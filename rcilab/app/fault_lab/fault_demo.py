@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -47,8 +48,8 @@ class FaultDemo:
     """Recorded cycles from the first command on (`core.cycle_log.cycle_dtype`); the last one shows the fault."""
     after: NDArray[np.void]
     """Recorded cycles after the fault, in which the controller stops the arm; they contain no commands."""
-    signal: FaultSignal
-    """The quantity that violated its condition, cycle by cycle."""
+    signal: FaultSignal | None
+    """The quantity that violated its condition, cycle by cycle; None of a refused request, which violates none."""
     way_out: tuple[RecoveryStep, ...]
     """The steps of the recovery, in this order; afterwards the arm moved again."""
 
@@ -78,29 +79,29 @@ class FaultDemo:
         return readonly_copy(self.cycles["q"][-1])
 
     @property
-    def condition(self) -> Condition:
-        """The violated condition: formula, unit, source."""
-        return self.signal.condition
+    def condition(self) -> Condition | None:
+        """The violated condition: formula, unit, source; None without a signal."""
+        return None if self.signal is None else self.signal.condition
 
     @property
     def value(self) -> float:
-        """The value that violated it, in the condition's unit."""
-        return self.signal.value
+        """The value that violated it, in the condition's unit; NaN without a signal."""
+        return math.nan if self.signal is None else self.signal.value
 
     @property
     def bound(self) -> float:
-        """The violated bound."""
-        return self.signal.bound
+        """The violated bound; NaN without a signal."""
+        return math.nan if self.signal is None else self.signal.bound
 
     @property
     def place(self) -> str:
-        """Location of the value: "joint 1", "tool", "elbow", "network"."""
-        return self.condition.location(self.signal.axis)
+        """Location of the value: "joint 1", "tool", "elbow", "network"; "" without a signal."""
+        return "" if self.signal is None else self.signal.condition.location(self.signal.axis)
 
     @property
     def source(self) -> str:
-        """Source of condition and bound."""
-        return self.condition.source
+        """Source of condition and bound; "" without a signal."""
+        return "" if self.signal is None else self.signal.condition.source
 
     @property
     def commanded(self) -> Motion:
@@ -164,21 +165,27 @@ class FaultDemo:
         Raises:
             InvalidValueError: The language is not supported.
         """
-        row, text = self.condition, Text(language)
+        text = Text(language)
+        return "\n".join(
+            (
+                f"{self.fault.manual_name}: {self.describe('explanation', language)}",
+                f"  {text('demo.head.sent')} {self.describe('sent', language)}",
+                *self._explain_condition(text, language),
+                f"  {text('demo.head.remedy')} {self.describe('prevention', language)}",
+                f"  {text('demo.head.way_out')} {' → '.join(self.recovery_steps(language))}",
+            )
+        )
+
+    def _explain_condition(self, text: Text, language: Language) -> list[str]:
+        row = self.condition
+        if row is None:
+            return []
         formula, source = explain_formula(row, language), explain_source(row, language)
         number = text(
             "demo.number", value=f"{self.value:.4g}", bound=f"{self.bound:.4g}", unit=row.unit,
             time=f"{self.time:.3f}",
         )  # fmt: skip
-        return "\n".join(
-            (
-                f"{self.fault.manual_name}: {self.describe('explanation', language)}",
-                f"  {text('demo.head.sent')} {self.describe('sent', language)}",
-                f"  {text('demo.head.condition')} {formula}; {self.place}: {number} [{source}]",
-                f"  {text('demo.head.remedy')} {self.describe('prevention', language)}",
-                f"  {text('demo.head.way_out')} {' → '.join(self.recovery_steps(language))}",
-            )
-        )
+        return [f"  {text('demo.head.condition')} {formula}; {self.place}: {number} [{source}]"]
 
     def __str__(self) -> str:
         return self.explain()

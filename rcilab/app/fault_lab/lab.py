@@ -110,6 +110,9 @@ class FaultLab(Closeable):
             self._go(robot, start)
         scene = scenario.prepare(self._scene(robot))
         progress(_PLACED)
+        if scenario.request is not None:
+            return self._request(robot, scenario, scenario.request, scene, progress)
+        assert scenario.act is not None  # A scenario has one of both.
         log = CycleLog(Recorder(self.model.n, _CAPACITY))
         try:
             robot.control(_logged(scenario.act(scene), log, progress), scenario.mode)
@@ -128,7 +131,8 @@ class FaultLab(Closeable):
         status = robot.world.status()
         progress(_SHOWN)
         lost = min(status.lost, LOST_COMMANDS_THRESHOLD)  # A controller that holds commands counts late ones, too.
-        signal = Signals(rows, self.model, scene.limits, scene.box, lost).find(scenario.fault)
+        signals = Signals(rows, self.model, scene.limits, scene.box, lost)
+        signal = signals.find(scenario.fault) or signals.reported(scenario.fault, status.reason)
         if signal is None:
             raise RcilabError(
                 f"{scenario.fault.manual_name}: the record does not show what the controller saw: {status.reason}"
@@ -143,7 +147,39 @@ class FaultLab(Closeable):
             cycles=rows,
             after=after,
             signal=signal,
-            way_out=tuple(self._leave(robot, scenario)),
+            way_out=tuple(self._leave(robot, scenario, scene)),
+        )
+
+    def _request(
+        self,
+        robot: RobotSession,
+        scenario: FaultScenario,
+        request: Callable[[Scene], tuple[FaultCode, ...]],
+        scene: Scene,
+        progress: Tell,
+    ) -> FaultDemo:
+        """Sends a request that is refused, to an arm at standstill, and records the cycles around it."""
+        log, begun = CycleLog(Recorder(self.model.n, _CAPACITY)), robot.receive_state().message_id
+        _watch_standstill(robot, log, begun)
+        sent = len(log.recorder.rows())
+        reported = request(scene)
+        _watch_standstill(robot, log, begun)
+        rows = log.recorder.rows()
+        progress(_SHOWN)
+        if scenario.fault not in reported:
+            error = RcilabError(f"{self.model.name}: {scenario.fault.manual_name} did not come")
+            raise error.coded("no_fault", fault=scenario.fault.manual_name)
+        return FaultDemo(
+            fault=scenario.fault,
+            scenario=scenario,
+            model=self.model,
+            limits=scene.limits,
+            reported=reported,
+            sentence=robot.world.status().reason,
+            cycles=rows[: sent + 1],
+            after=rows[sent + 1 :],
+            signal=None,
+            way_out=tuple(self._leave(robot, scenario, scene)),
         )
 
     def _scene(self, robot: RobotSession) -> Scene:
@@ -152,7 +188,7 @@ class FaultLab(Closeable):
         commands = getattr(robot, maker.scheme)
         return Scene(robot=robot, commands=commands, start=robot.receive_state(), limits=self.model.limits)
 
-    def _leave(self, robot: RobotSession, scenario: FaultScenario) -> list[RecoveryStep]:
+    def _leave(self, robot: RobotSession, scenario: FaultScenario, scene: Scene) -> list[RecoveryStep]:
         """Recovers from a fault and returns the steps."""
         done: list[RecoveryStep] = []
         if scenario.cuts_network:
@@ -163,6 +199,7 @@ class FaultLab(Closeable):
             done.append("release")
             self._wait_for_small_force(robot)
         done += self._recover(robot)
+        scenario.restore(scene)
         self._widen(robot)
         self._configure(robot, RobotConfiguration(control=default_parameters(parameters_of(self.model))))
         back = plan_recovery(self.model, robot.receive_state().q_c)
@@ -230,6 +267,14 @@ def _watch_stop(robot: RobotSession, last: np.void, stop: NDArray[np.void]) -> N
     )  # Missed cycles are not interpolated: the record ends there.
     rows = rows[: missed[0]] if missed.size else rows
     return rows[rows["message_id"] <= begun + _AFTER]
+
+
+def _watch_standstill(robot: RobotSession, log: CycleLog, begun: int) -> None:
+    """Records some cycles of an arm that stands still; their time begins in the cycle `begun`."""
+    end = robot.receive_state().message_id + _AFTER
+    while log.state is None or log.state.message_id < end:
+        for state in robot.receive_states():
+            log.write(state, time.monotonic_ns(), (state.message_id - begun) * CYCLE_TIME)
 
 
 def _logged(callback: Callback, log: CycleLog, progress: Tell) -> Callback:

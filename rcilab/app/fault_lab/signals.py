@@ -21,6 +21,7 @@ from rcilab.core.errors import UnreachableError
 from rcilab.core.fault import FaultCode
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
+from rcilab.i18n.translator import Remark
 from rcilab.model.kinematics.collision import ClearanceQuery
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.momentum_observer import MomentumObserver
@@ -56,6 +57,11 @@ class FaultSignal:
         if not math.isfinite(lower):
             return upper
         return upper if self.value >= 0.5 * (lower + upper) else lower
+
+    @property
+    def has_curve(self) -> bool:
+        """Whether more than the last value is known."""
+        return int(np.isfinite(self.values).sum()) > 1
 
     @property
     def is_broken(self) -> bool:
@@ -95,6 +101,27 @@ class Signals:
         found = [signal for row in rows for signal in self._signals(row) if signal.is_broken]
         return max(found, key=lambda signal: signal.excess, default=None)
 
+    def reported(self, fault: FaultCode, reason: str) -> FaultSignal | None:
+        """Returns the signal of a fault for which the record has no values: the last one is that of the controller.
+
+        Args:
+            fault: The fault.
+            reason: The controller's sentence; without numbers there is no signal.
+        """
+        rows = self._table.raising(fault)
+        if not (rows and isinstance(reason, Remark) and {"value", "bound"} <= reason.facts.keys()):
+            return None
+        facts = reason.facts
+        value, bound = float(facts["value"]), float(facts["bound"])  # type: ignore[arg-type]
+        count = len(self._rows)
+        return FaultSignal(
+            condition=rows[0],
+            axis=int(facts.get("joint", 0)),  # type: ignore[call-overload]
+            values=np.append(np.full(count - 1, np.nan), value),
+            lower=np.full(count, -bound if value < 0.0 else -np.inf),
+            upper=np.full(count, bound),
+        )
+
     def _signals(self, condition: Condition) -> list[FaultSignal]:
         values = self._values(condition)
         if values is None:
@@ -128,7 +155,7 @@ class Signals:
             return self._distance_from_start(condition)
         match condition.signal:
             case "external_torque":
-                return self._external()
+                return self._external() if np.isfinite(self._rows["tau"]).all() else None
             case "lost_commands":
                 last = len(self._rows) - 1
                 return np.maximum(self._lost - last + np.arange(last + 1), 0.0)[:, None]
@@ -138,6 +165,9 @@ class Signals:
             case "joint":
                 commands = self._joint_commands()
                 return None if commands is None else _differences(commands, condition.order, self._period)
+            case "joint_step":
+                commands = self._joint_commands()
+                return None if commands is None else np.diff(commands, axis=0)[_BEFORE - 1 :]
             case "torque":
                 torques = self._sent("command_tau", np.zeros(self._model.n))
                 return None if torques is None else _differences(torques, condition.order, self._period)

@@ -23,6 +23,10 @@ ANGULAR_SPEED: Final = 0.6  # [rad/s]
 ANGULAR_ACCELERATION: Final = 4.0  # [rad/s^2]
 LARGEST_STREAM_STEP: Final = 10.0
 """Largest distance of a joint from one streamed command to the next, [deg]; the maker's page on movej_canfd."""
+SPEED_ALLOWANCE: Final = 1.15
+"""Factor on the largest speed of a joint, beyond which it is too fast; rcilab's own.
+
+Streamed angles that arrive irregularly are followed up to a tenth faster."""
 LONGEST_TOOL: Final = 1.0  # [m] Distance of a tool frame, or of a centre of mass, from the flange; rcilab's own bound.
 HEAVIEST_LOAD: Final = 10.0  # [kg] rcilab's own bound; the rated payload is 5 kg.
 FIRST_WORK_FRAME: Final = "World"

@@ -7,10 +7,14 @@ its tool, which a client can change; the page "Appendix: error codes" names the 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import radians
+
+import numpy as np
 
 from rcilab.conformance.common_conditions import (
     CARTESIAN_FRAME,
     CARTESIAN_POSITION,
+    EXTERNAL_TORQUE,
     JOINT_ACCELERATION,
     JOINT_CONDITIONS,
     JOINT_END_CONDITIONS,
@@ -24,7 +28,8 @@ from rcilab.conformance.common_conditions import (
     TOOL_STANDSTILL_CONDITIONS,
     TORQUE_CONDITIONS,
 )
-from rcilab.core.condition import Condition, ConditionTable
+from rcilab.core.condition import AnyLimits, Bounds, Condition, ConditionTable, joint_limits
+from rcilab.makers.realman.bounds import LARGEST_STREAM_STEP
 from rcilab.makers.realman.errors import RealManError
 
 _ERRORS = "RealMan's page Appendix: error codes"
@@ -43,6 +48,11 @@ _MEASURED_ERRORS = {
     ("translation", 1): RealManError.OVERSPEED,
     ("rotation", 1): RealManError.OVERSPEED,
 }
+
+
+def _largest_step(limits: AnyLimits) -> Bounds:
+    bound = np.full(len(joint_limits(limits).lower), radians(LARGEST_STREAM_STEP))
+    return -bound, bound
 
 
 def _recommended(row: Condition) -> Condition:
@@ -83,6 +93,32 @@ _LINKS = replace(
     fault=RealManError.SELF_COLLISION,
     source=f"{_ERRORS}, self-collision; bound: rcilab, the page has no distance",
 )
+_STEP = Condition(
+    id="stream.step",
+    quantity="step of streamed angles",
+    formula=f"|q_c - q_c,before| < {LARGEST_STREAM_STEP:g} deg",
+    necessity="necessary",
+    unit="rad",
+    source="RealMan's page on movej_canfd",
+    fault=RealManError.JOINT_POSITION_STEP,
+    stage="throughout",
+    signal="joint_step",
+    order=0,
+    bounds=_largest_step,
+)
+_FENCE = replace(
+    CARTESIAN_POSITION,
+    id="links.fence",
+    quantity="distance of a link beyond the fence",
+    formula="d < 0",
+    fault=RealManError.FENCE,
+    source="RealMan's page Electronic fence (links: capsules of rcilab)",
+)
+_CONTACT = replace(
+    EXTERNAL_TORQUE,
+    fault=RealManError.COLLISION,
+    source=f"{_ERRORS}; the threshold follows from the collision stage, the maker gives no figure",
+)
 
 REALMAN_CONDITIONS = ConditionTable(
     name="RealMan",
@@ -91,7 +127,7 @@ REALMAN_CONDITIONS = ConditionTable(
     torque=_TORQUES,
     measured=_MEASURED,
     box=_BOX,
-    conditions=(*_MOTION, _BOX, *_TOOL, *_TORQUES, *_MEASURED, _LINKS),
+    conditions=(*_MOTION, _STEP, _FENCE, _BOX, *_TOOL, *_TORQUES, *_MEASURED, _CONTACT, _LINKS),
 )
 """The rows for `check` and the monitors."""
 

@@ -60,8 +60,10 @@ class RealMan:
         return parameter_groups(model)
 
     def scenarios(self, model: RobotModel) -> tuple[FaultScenario, ...]:
-        """Returns none."""
-        return ()
+        """Returns the scenarios of its errors, the same for every arm."""
+        from rcilab.makers.realman.scenarios import scenarios
+
+        return scenarios()
 
     def parse_address(self, text: str) -> ControllerAddress:
         """Returns the parts of an address, realman://HOST:PORT."""

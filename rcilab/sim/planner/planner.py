@@ -140,6 +140,12 @@ class Planner:
         return self._queue.current
 
     @property
+    def streamed(self) -> list[float] | None:
+        """The newest streamed angles, n plain floats, [rad]; None while another motion, or none, is followed."""
+        mover = self._mover
+        return mover.target if isinstance(mover, StreamMover) else None
+
+    @property
     def progress(self) -> float:
         """Share of the path of the current target, 0 to 1; 1 without one."""
         return self._queue.progress
@@ -402,8 +408,8 @@ class Planner:
         Raises:
             InvalidValueError: A value is not valid.
         """
-        mover, model = self._mover, self._arm.model
-        near = mover.target if isinstance(mover, StreamMover) else self._q
+        model = self._arm.model
+        near = self._q if self.streamed is None else self.streamed
         if max_step is not None:
             step = dist(model.forward(near).parts[1], pose.parts[1])
             if step > max_step:

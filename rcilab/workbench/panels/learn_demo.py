@@ -15,7 +15,7 @@ from rcilab.workbench.panels.plot_contents import joint_color, plot_axes
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.app.fault_lab import FaultDemo
+    from rcilab.app.fault_lab.signals import FaultSignal
     from rcilab.app.store import Theme, UiState
     from rcilab.control_process import SupervisorStatus
 
@@ -63,22 +63,24 @@ class LearnDemoPanel:
         if wanted == self._drawn:
             return
         self._drawn = wanted
-        for part in (self._back, self._plot, self._moment, self._python):
+        signal = None if demo is None or demo.signal is None or not demo.signal.has_curve else demo.signal
+        for part in (self._back, self._moment, self._python):
             part.visible = demo is not None
+        self._plot.visible = signal is not None
         if demo is None:
             for part in (self._head, self._body, self._script):
                 part.show("")
             return
         self._head.show(head_html(demo, text))
-        self._draw(demo, state.theme)
+        if signal is not None:
+            self._draw(signal, np.array(demo.cycles["t"]), state.theme)
         self._body.show(body_html(demo, text))
         code = f"<pre>{esc(demo.script)}</pre>"
         copy = f'<button type="button" data-rl-copy data-done="{esc(text("program.copied"))}">'
         copy += f"{esc(text('program.copy'))}</button>"
         self._script.show(f'<div class="rl-code">{copy}{code}</div>' if learn.is_script_shown else "")
 
-    def _draw(self, demo: FaultDemo, theme: Theme) -> None:
-        signal, t = demo.signal, np.array(demo.cycles["t"])
+    def _draw(self, signal: FaultSignal, t: Array, theme: Theme) -> None:
         factor = self._text.units.from_si(signal.condition.unit)[0]
         data, series, _ = _contents(t, factor * signal.values, factor * signal.lower, factor * signal.upper, theme)
         low, high = float(np.nanmin(data[1:])), float(np.nanmax(data[1:]))

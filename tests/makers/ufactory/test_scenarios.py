@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 
 from rcilab.app.fault_lab import FaultLab
+from rcilab.app.fault_lab.demo_view import body_html
+from rcilab.app.text import Text
 from rcilab.makers.ufactory.errors import UfactoryError
 from rcilab.makers.ufactory.robots import ROBOTS
 from rcilab.makers.ufactory.scenarios import scenarios_of
@@ -23,6 +25,9 @@ def test_errors_come_with_their_reason_and_the_arm_moves_again():
             assert demo.signal.is_broken
             assert demo.describe("sent", "en") != demo.describe("sent", "zh")
             assert demo.way_out[-2:] == ("recover", "move")
+            assert all(
+                demo.recovery_steps(language)[-1] in body_html(demo, Text(language)) for language in ("en", "zh")
+            )
 
 
 @needs_library

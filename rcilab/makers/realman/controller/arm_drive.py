@@ -7,14 +7,14 @@ a client has set.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import radians
+from math import degrees, radians
 
 import numpy as np
 
 from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
-from rcilab.makers.realman.bounds import ANGLE_STEP
+from rcilab.makers.realman.bounds import ANGLE_STEP, SPEED_ALLOWANCE
 from rcilab.motion.bounds import range_from
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arm_command import ArmCommand
@@ -145,9 +145,13 @@ class ArmDrive:
         self._idle_cycles = 0
         arm.prepare_motion(_MODE)
         joint = self._limits.joint
-        acceleration = readonly_copy(_ALLOWANCE * joint.acceleration)
-        unchecked = replace(joint, acceleration=acceleration, jerk=np.full(arm.model.n, np.inf))  # Jerks have no error.
-        arm.begin_motion(replace(self._limits, joint=unchecked), checks_accelerations=False)
+        checked = replace(
+            joint,
+            velocity=readonly_copy(SPEED_ALLOWANCE * joint.velocity),
+            acceleration=readonly_copy(_ALLOWANCE * joint.acceleration),
+            jerk=np.full(arm.model.n, np.inf),  # Jerks have no error.
+        )
+        arm.begin_motion(replace(self._limits, joint=checked), checks_accelerations=False)
         arm.is_monitored = True
 
 
@@ -157,9 +161,18 @@ def require_angles(q: JointVector, limits: Limits) -> None:
     Raises:
         InvalidValueError: One is outside; it names the joint.
     """
+    found = find_outside(q, limits)
+    if found is not None:
+        joint, _ = found
+        low, high = np.degrees((limits.joint.lower[joint - 1], limits.joint.upper[joint - 1])).tolist()
+        problem = f"deg is outside its range of {low:.6g} to {high:.6g} deg"
+        raise InvalidValueError(f"joint {joint}", round(degrees(q[joint - 1]), 3), problem)
+
+
+def find_outside(q: JointVector, limits: Limits) -> tuple[int, float] | None:
+    """Returns the first joint, from 1, that is outside its range, and the end that it passes, [rad]; else None."""
     joint = limits.joint
     for number, (angle, low, high) in enumerate(zip(q.tolist(), joint.lower, joint.upper, strict=True), 1):
         if not low <= angle <= high:
-            low_deg, high_deg, angle_deg = np.degrees((low, high, angle)).tolist()
-            problem = f"deg is outside its range of {low_deg:.6g} to {high_deg:.6g} deg"
-            raise InvalidValueError(f"joint {number}", round(angle_deg, 3), problem)
+            return number, float(low if angle < low else high)
+    return None

@@ -36,7 +36,7 @@ def _require_new(name: str, frames: Mapping[str, object]) -> None:
 
 def _missing(controller: RealManController, error: RealManError, name: str) -> InvalidValueError:
     problem = InvalidValueError("frame", name, "does not exist")
-    controller.set_error(error, Remark(str(problem)))
+    controller.set_error(error, Remark(str(problem), "no_frame", name=name))
     return problem
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
-from math import pi
+from math import degrees, pi
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Remark
-from rcilab.makers.realman.controller.arm_drive import require_angles
+from rcilab.makers.realman.controller.arm_drive import find_outside, require_angles
 from rcilab.makers.realman.controller.handler import Getter, Setter, setter
 from rcilab.makers.realman.controller.joint_parameters import require_joint
 from rcilab.makers.realman.controller.realman_controller import RealManController
@@ -22,6 +22,7 @@ from rcilab.makers.realman.wire.line import Request
 from rcilab.makers.realman.wire.units import angles_from_millidegrees, pose_from_wire
 from rcilab.model.kinematics.solvers.build import build_solver
 from rcilab.model.kinematics.solvers.numeric.solver import NumericSolver
+from rcilab.motion.bounds import range_from
 from rcilab.sim.channels import Peer
 from rcilab.sim.planner import (
     ArcTarget,
@@ -74,18 +75,27 @@ def tool_speed(controller: RealManController, share: float) -> ToolSpeed:
     return ToolSpeed(velocity=share * tip.line_speed, rotation_velocity=share * tip.angular_speed)
 
 
-def read_angles(controller: RealManController, request: Request, name: str = "joint") -> tuple[float, ...]:
+def read_angles(controller: RealManController, request: Request, *, inwards: bool = False) -> tuple[float, ...]:
     """Returns joint angles inside the ranges in force, [rad].
+
+    Args:
+        controller: The controller.
+        request: The request.
+        inwards: Whether a joint that is outside may also have angles from there on.
 
     Raises:
         InvalidValueError: They are not; the error of the system is set.
     """
-    q = angles_from_millidegrees(request.integers(name, controller.model.n))
-    try:
-        require_angles(np.array(q), controller.limits)
-    except InvalidValueError as error:
-        controller.set_error(RealManError.TARGET_OVER_LIMIT, Remark(str(error)))
-        raise
+    q, limits = angles_from_millidegrees(request.integers("joint", controller.model.n)), controller.limits
+    if inwards:
+        limits = replace(limits, joint=range_from(limits.joint, np.array(controller.drive.q_c)))
+    found = find_outside(np.array(q), limits)
+    if found is not None:
+        joint, bound = found
+        sentence = f"joint {joint}: {degrees(q[joint - 1]):.6g} deg is beyond its limit of {degrees(bound):.6g} deg"
+        reason = Remark(sentence, "target_range", joint=joint, value=q[joint - 1], bound=bound, unit="rad")
+        controller.set_error(RealManError.TARGET_OVER_LIMIT, reason)
+        raise InvalidValueError("target", "", sentence)
     return q
 
 

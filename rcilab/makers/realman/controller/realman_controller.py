@@ -23,6 +23,7 @@ from rcilab.i18n.translator import Remark
 from rcilab.makers.realman.bounds import MOST_SENSITIVE
 from rcilab.makers.realman.controller.arm_drive import ArmDrive
 from rcilab.makers.realman.controller.fault_of import REFUSALS, errors_of
+from rcilab.makers.realman.controller.fence import FenceWatch
 from rcilab.makers.realman.controller.flash import Flash
 from rcilab.makers.realman.controller.joint_parameters import RECOMMENDED_RATIO, JointParameters, require_joint
 from rcilab.makers.realman.controller.reporter import report_state
@@ -108,6 +109,7 @@ class RealManController:
         self.ignored = 0
         self._inputs = [False] * SIGNALS
         self._links = SelfCollisionWatch(arm.model)
+        self._fence = FenceWatch(arm.model)
         self._is_watching = False
         self._number = 0
         self.on_end: Callable[[Trajectory, bool, bool], None] = lambda trajectory, reached, continues: None
@@ -240,6 +242,8 @@ class RealManController:
             self._needs_configuration = True
         if settings.collision_stage != before.collision_stage:
             self._needs_configuration = True
+        if (settings.fence, settings.fence_side) != (before.fence, before.fence_side):
+            self._fence.begin()
 
     def set_joint_value(self, name: str, joint: int, value: int, *, is_drive: bool) -> None:
         """Sets a parameter of a joint, see `JointParameters`.
@@ -285,7 +289,10 @@ class RealManController:
             if not self.drive.is_still or self.drive.is_stopping:
                 raise InvalidValueError("joint", joint, "moves; it must stand still to be enabled")
         elif self.enabled[joint - 1] and self.is_moving:
-            self._fail(RealManError.JOINT_DISABLED, Remark(f"joint {joint} was disabled during a motion"))
+            self._fail(
+                RealManError.JOINT_DISABLED,
+                Remark(f"joint {joint} was disabled during a motion", "joint_disabled", joint=joint),
+            )
         self.enabled[joint - 1] = on
         self._hold()
 
@@ -332,7 +339,7 @@ class RealManController:
             self._require_no_error(joint, word)
             if not is_on:
                 problem = f"joint {joint} is disabled; set_joint_en_state enables it"
-                self.set_error(RealManError.JOINT_DISABLED, Remark(problem))
+                self.set_error(RealManError.JOINT_DISABLED, Remark(problem, "joint_disabled", joint=joint))
                 raise InvalidValueError("motion", "", f"is not possible: {problem}")
 
     def begin_command(self) -> None:
@@ -379,7 +386,7 @@ class RealManController:
             for error, joint in errors_of(commands or measured):
                 self.set_error(error, self.reason, joint)
             self._end_all()
-        self._check_links()
+        self._check_surroundings()
         for event in self.drive.events:
             self._handle(event.id, event.kind, event.refusal)
         if self.streamed and self.drive.is_still:
@@ -398,17 +405,22 @@ class RealManController:
         if trajectory is not None:
             self.on_end(trajectory, kind is EventKind.REACHED, trajectory.is_followed_by_another)
 
-    def _check_links(self) -> None:
-        """Stops a motion in which links touch; an arm whose links touch may move them apart."""
-        q = self.arm.signals.measured.q
+    def _check_surroundings(self) -> None:
+        """Stops a motion in which links touch or go beyond the fence; an arm that does so already may move back."""
+        q, settings = self.arm.signals.measured.q, self.settings
         was_watching, self._is_watching = self._is_watching, self.arm.is_following
-        if not (self._is_watching and self.settings.avoids_self_collision):
+        if not self._is_watching:
             return
         if not was_watching:
             self._links.begin(q)
-        touching = self._links.step(q)
+            self._fence.begin()
+        touching = self._links.step(q) if settings.avoids_self_collision else None
         if touching is not None:
             self._fail(RealManError.SELF_COLLISION, touching)
+        fence = settings.fence if settings.is_fenced else None
+        beyond = None if fence is None else self._fence.step(q, fence, settings.fence_side)
+        if beyond is not None:
+            self._fail(RealManError.FENCE, beyond)
 
     def _end_all(self) -> None:
         """Reports the end of every trajectory that a fault has discarded."""

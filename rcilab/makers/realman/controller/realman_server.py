@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from rcilab.core.errors import DecodeError, InvalidValueError
 from rcilab.makers.realman.bounds import CLIENT_PORT, PUSH_PERIOD
 from rcilab.makers.realman.controller import (
+    fence_requests,
     frame_requests,
     joint_requests,
     motion_requests,
@@ -31,7 +32,7 @@ from rcilab.sim.virtual_arm import VirtualArm
 
 _PROTOCOL = "RealMan's JSON protocol"
 _MOST_CLIENTS = 8
-_PARTS = (joint_requests, state_requests, frame_requests, motion_requests, setting_requests)
+_PARTS = (joint_requests, state_requests, frame_requests, motion_requests, setting_requests, fence_requests)
 SETTERS: dict[str, Setter] = {name: setter for part in _PARTS for name, setter in getattr(part, "SETTERS", {}).items()}
 GETTERS: dict[str, Getter] = {name: getter for part in _PARTS for name, getter in part.GETTERS.items()}
 

@@ -25,6 +25,7 @@ from rcilab.makers.realman.bounds import (
     LONGEST_TOOL,
     PUSH_PORT,
 )
+from rcilab.makers.realman.controller.fence import Fence, Side
 from rcilab.model.dynamics.payload import NO_LOAD, Payload
 
 MOST_FRAMES: Final = 10
@@ -121,6 +122,10 @@ class Settings:
     velocity_in_tool: bool = False
     """Axes of streamed velocities."""
     avoids_self_collision: bool = False
+    fence: Fence | None = None
+    is_fenced: bool = False
+    fence_side: Side = "inside"
+    """Of the fence, where the arm has to be."""
     outputs: tuple[int, ...] = (0,) * SIGNALS
     init_pose: tuple[int, ...] = ()
     """[0.001 deg]."""

@@ -1,13 +1,13 @@
 """Commands that clients stream: joint angles, poses and velocities of the tool. None is answered.
 
-A joint more than 10 deg from its angle, or from the one streamed before, does not follow the command; the bit of its
-error word is set. What is outside the limits sets the error of the system.
+A joint more than 10 deg from the angle that was streamed before, at first from its own, does not follow the command;
+the bit of its error word is set. What is outside the limits sets the error of the system.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import degrees
+from math import degrees, radians
 from typing import TypeAlias
 
 import numpy as np
@@ -32,7 +32,7 @@ Stream: TypeAlias = Callable[[RealManController, Request], None]
 
 
 def _joints(controller: RealManController, request: Request) -> None:
-    q = read_angles(controller, request)
+    q = read_angles(controller, request, inwards=True)
     _require_near(controller, q)
     controller.begin_command()
     mode, smoothing = _read_smoothing(request)
@@ -41,7 +41,7 @@ def _joints(controller: RealManController, request: Request) -> None:
 
 
 def _follow_joints(controller: RealManController, request: Request) -> None:
-    q = read_angles(controller, request)
+    q = read_angles(controller, request, inwards=True)
     controller.begin_command()
     _follow(controller, "joint", controller.drive.planner.move_joints(q, JointSpeed()))
 
@@ -87,13 +87,17 @@ def _read_pose(controller: RealManController, request: Request) -> Pose:
 
 
 def _require_near(controller: RealManController, q: Sequence[float]) -> None:
-    steps = np.abs(np.array(q) - controller.drive.q_c)
+    drive = controller.drive
+    before = drive.planner.streamed
+    steps = np.abs(np.array(q) - (drive.q_c if before is None else before))
     joint = int(steps.argmax()) + 1
     step = degrees(float(steps.max()))
     if step > LARGEST_STREAM_STEP:
         problem = f"deg is the step of joint {joint}, more than {LARGEST_STREAM_STEP:g} deg; stream smaller steps"
         error = InvalidValueError("joint", round(step, 3), problem)
-        controller.set_error(RealManError.JOINT_POSITION_STEP, Remark(str(error)), joint)
+        bound = radians(LARGEST_STREAM_STEP)
+        reason = Remark(str(error), "stream_step", joint=joint, value=radians(step), bound=bound, unit="rad")
+        controller.set_error(RealManError.JOINT_POSITION_STEP, reason, joint)
         raise error
 
 

@@ -104,6 +104,11 @@ class RealManSettings:
         """
         return self._client.api
 
+    @property
+    def library(self) -> Any:
+        """The module of the maker's library, with its structures."""
+        return self._client.library
+
     def set_tool(self, T_flange_tool: Pose) -> None:
         """Sets the pose of the tool in the flange frame, at most 1 m away, and keeps the load."""
         tool = as_pose(T_flange_tool, "T_flange_tool")

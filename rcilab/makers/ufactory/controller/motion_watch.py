@@ -84,7 +84,7 @@ class MotionWatch:
         if excess <= before:
             return None
         text = f"the tool is {excess:.2g} mm outside the safety boundary"
-        remark = Remark(text, "outside_boundary", value=MILLIMETRE * excess, unit="m")
+        remark = Remark(text, "outside_boundary", away=MILLIMETRE * excess)
         return Finding(UfactoryError.SAFETY_BOUNDARY, remark)
 
     def _find_fast(self, settings: Settings) -> Finding | None:

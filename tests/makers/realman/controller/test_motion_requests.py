@@ -393,3 +393,46 @@ def test_the_tool_can_be_changed_right_after_a_motion():
     assert bench.pose[2] == pytest.approx(before - 100000, abs=10)
     bench.ask("movej", joint=FRONT["RM65"], v=50)
     assert bench.run_until_event()["trajectory_state"] is True
+
+
+def test_a_plan_at_full_speed_is_followed_and_a_faster_stream_is_an_error():
+    bench = Bench()
+    joint = bench.controller.limits.joint
+    q = bench.q
+
+    def stream(factor: float) -> None:
+        top, since = factor * np.degrees(joint.velocity[0]), 0.8 * np.degrees(joint.acceleration[0])
+        for step in range(130):
+            t = 0.005 * step
+            angle = min(0.5 * since * t * t, top * t - 0.5 * top * top / since if t > top / since else np.inf)
+            bench.send("movej_canfd", joint=[q[0] + round(1000 * angle), *q[1:]], follow=True, trajectory_mode=1)
+            bench.run(4 if step % 2 else 6)
+
+    stream(1.0)
+    assert bench.err == [0]
+    bench.run(1000)
+    assert bench.ask("movej", joint=q, v=100)["receive_state"] is True
+    bench.run_until_event()
+    bench.run(1000)
+    bench.ask("set_joint_en_state", joint_en_state=[1, 0])
+    bench.ask("set_joint_max_speed", joint_max_speed=[1, 10000])
+    bench.ask("set_joint_en_state", joint_en_state=[1, 1])
+    joint = bench.controller.limits.joint
+    stream(1.4)
+    assert bench.err == [RealManError.JOINT_OVERSPEED.code]
+
+
+def test_a_stream_leads_a_joint_back_into_its_range():
+    bench = Bench()
+    q = bench.q
+    bench.ask("set_joint_en_state", joint_en_state=[6, 0])
+    bench.ask("set_joint_max_pos", joint_max_pos=[6, -1000])
+    bench.ask("set_joint_en_state", joint_en_state=[6, 1])
+    bench.send("movej_canfd", joint=[*q[:5], 500], follow=True, trajectory_mode=1)
+    assert bench.err == [RealManError.TARGET_OVER_LIMIT.code], "farther out"
+    for step in range(60):
+        bench.send("movej_canfd", joint=[*q[:5], -50 * step], follow=True, trajectory_mode=1)
+        bench.run(5)
+    bench.run(500)
+    assert bench.q[5] == pytest.approx(-2950, abs=2)
+    assert bench.err == [0]
