@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.conformance.check import check
+from rcilab.conformance.free_elbow import resulting_motion
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import RcilabError
@@ -61,6 +62,13 @@ class Plan:
     """Whether collisions were checked, too. Not during a drag: the check would halve the rate."""
     is_recorded: bool = False
     """Whether it is what a client commanded: after its last row, the controller commands the arm."""
+    planned: Motion | None = None
+    """The motion as planned, where the joints of the mode will move otherwise; None: as `motion`."""
+
+    @property
+    def as_planned(self) -> Motion:
+        """The motion as planned, in any mode."""
+        return self.motion if self.planned is None else self.planned
 
     @property
     def starts_at(self) -> JointVector:
@@ -71,8 +79,16 @@ class Plan:
         """Returns this plan with a report on all conditions of a mode, with collisions, as execution requires it."""
         if self.complete and self.mode == mode:
             return self
-        report = check(self.motion, self.model, box=self.box, mode=mode)
-        return replace(self, report=report, mode=mode, complete=True)
+        planned = self.as_planned
+        motion = resulting_motion(planned, self.model, mode)
+        if len(motion) < len(planned):
+            motion = planned  # The report names the pose that is out of reach.
+        report = check(motion, self.model, box=self.box, mode=mode)
+        if motion is self.motion:
+            return replace(self, report=report, mode=mode, complete=True)
+        drawn = build_plan_view(self.model, motion, report, self.box)
+        of_mode = replace(self, motion=motion, report=report, path=drawn.path, effort=drawn.effort)
+        return replace(of_mode, mode=mode, complete=True, planned=None if motion is planned else planned)
 
     def stale_parts(self, model: RobotModel, box: SafetyBox | None) -> tuple[str, ...]:
         """Returns what has changed since the plan was checked, as in certificates: tool, load, joint limits, box.

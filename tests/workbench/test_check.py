@@ -258,8 +258,10 @@ def test_the_tab_says_where_the_controller_chooses_the_elbow(name: str, is_free:
     motion = plan_joint(model, model.home, model.home + 0.1, speed=0.3)
     plan = build_plan_view(model, motion, check(motion, model))
     assert text("check.free_elbow") not in panel._headline(plan, None, None, is_current=True)
-    plan = plan.completed("cartesian_position")
-    assert (text("check.free_elbow") in panel._headline(plan, None, None, is_current=True)) is is_free
+    there = plan.completed("cartesian_position")
+    assert (text("check.free_elbow") in panel._headline(there, None, None, is_current=True)) is is_free
+    assert (there.motion is motion) is not is_free
+    assert there.completed("joint_position").motion is motion
 
 
 @pytest.mark.parametrize("phase", ["closed", "lost", "crashed"])

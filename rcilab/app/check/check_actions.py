@@ -83,7 +83,7 @@ class CheckActions:
         elif self._work.progress is not None and self._work.progress != self._check.progress:
             self._set(progress=self._work.progress)
         slowed, plan = self._check.slowed, self._store.state.plan
-        if slowed is not None and (plan is None or plan.motion is not slowed.after.motion):
+        if slowed is not None and (plan is None or plan.as_planned is not slowed.after.as_planned):
             self._set(slowed=None)
 
     def close(self) -> None:
@@ -136,7 +136,7 @@ class CheckActions:
 
     def _finish(self, before: Plan, result: SlowdownJob) -> None:
         state = self._store.state
-        if state.plan is None or state.plan.motion is not before.motion:
+        if state.plan is None or state.plan.as_planned is not before.as_planned:
             self._answer("warn", message("check.overtaken"))
             return
         if result.plan is None:

@@ -143,7 +143,7 @@ class SetupPanel:
         where = esc(self._text("setup.in_mode"))
         return [
             f"<tr><th>{esc(name)}</th><td>{esc(shown)}"
-            f'<br><span class="rl-dim">{esc(units_of(group))} {where}</span></td></tr>'
+            f'<br><span class="rl-dim">{esc(units_of(group))}<br>{where}</span></td></tr>'
             for group, (name, shown) in zip(groups, held, strict=True)
         ]
 

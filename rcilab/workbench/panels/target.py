@@ -84,7 +84,7 @@ def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     code = "target.recorded" if plan.is_recorded else code if plan.program is None else "program.planned"
     sentence = text(code, duration=f"{plan.motion.duration:.3f}")
     if plan.missed_by is not None:
-        sentence += ". " + text("target.leads_short", short=text.render(plan.missed_by))
+        sentence = _with_sentence(sentence, text("target.leads_short", short=text.render(plan.missed_by)), text)
         tone, word = (tone, word) if not report.ok else ("warn", "target.not_there")
     if not report.ok:
         worst, more = report.violations[0].condition.id, report.violated_conditions - 1
@@ -94,7 +94,12 @@ def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
         sentence += " · " + text("target.unheeded", count=unheeded)
     aside = beside_program(state)
     if aside is not None:
-        tone, sentence = "warn" if report.ok else tone, sentence + ". " + text.render(aside)
+        tone, sentence = "warn" if report.ok else tone, _with_sentence(sentence, text.render(aside), text)
     if plan.note is not None:
-        sentence += (" " if sentence[-1:] in ".。" else ". ") + text.render(plan.note)
+        sentence = _with_sentence(sentence, text.render(plan.note), text)
     return f'<p class="rl-verdict rl-{tone}"><b>{esc(text(word))}</b> {esc(sentence)}</p>'
+
+
+def _with_sentence(sentence: str, following: str, text: Text) -> str:
+    """Returns a sentence, with or without its full stop, and the following one."""
+    return sentence.rstrip(".。") + ("。" if text.language == "zh" else ". ") + following

@@ -105,6 +105,7 @@ def test_the_plan_of_poses_has_the_joint_angles_that_the_arm_follows(robot):
     run = robot.execute(motion, report.certificate, mode="cartesian_position")
     assert np.abs(run.error).max() <= 1e-6
     is_free = robot.model.name == "FR3"
+    assert robot._driver.commands_arm_angle is not is_free
     assert ("sent without the arm angle" in report.title) is is_free
     assert bool(np.abs(robot.state.q_c - motion.goal).max() > 0.1) is is_free
     assert run.plan.goal == pytest.approx(robot.state.q_c, abs=1e-6)
