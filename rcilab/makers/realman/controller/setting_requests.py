@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 import ipaddress
-from collections.abc import Callable
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 from rcilab.core.errors import InvalidValueError
 from rcilab.makers.realman.bounds import FASTEST_TOOL, MOST_SENSITIVE, STRONGEST_TOOL
 from rcilab.makers.realman.controller.handler import Getter, Setter, setter
 from rcilab.makers.realman.controller.realman_controller import RealManController
-from rcilab.makers.realman.controller.settings import SIGNALS, PushSettings, TipSpeeds
+from rcilab.makers.realman.controller.settings import (
+    OUTPUT_MODE,
+    SIGNALS,
+    TOOL_SIGNALS,
+    PushSettings,
+    TipSpeeds,
+)
 from rcilab.makers.realman.wire.line import Request
+
+T = TypeVar("T")
 
 _MILLI = 1e-3
 _LONGEST_CYCLE = 1000  # [5 ms]
-_OUTPUT_MODE = 1
+_LAST_MODE = 14
+_SPEED_MODE = 14
+_VOLTAGES = (0, 2, 3)  # 0 V, 12 V, 24 V.
+_TOOL_VOLTAGES = (0, 1, 2, 3)  # And 5 V.
+_LAST_PROGRAM = 100
 
 
 def _tip_setter(name: str) -> Setter:
@@ -75,17 +86,70 @@ def _emergency_stop(controller: RealManController, request: Request) -> None:
     controller.press_button("estop" if request.flag("state") else "none")
 
 
-def _signal(request: Request) -> int:
-    number = request.integer("IO_Num")
-    if not 1 <= number <= SIGNALS:
-        raise InvalidValueError("IO_Num", number, f"must be 1 to {SIGNALS}")
-    return number - 1
+def _within(request: Request, name: str, first: int, last: int) -> int:
+    value = request.integer(name)
+    if not first <= value <= last:
+        raise InvalidValueError(name, value, f"must be {first} to {last}")
+    return value
+
+
+def _signal(request: Request, count: int = SIGNALS) -> int:
+    return _within(request, "IO_Num", 1, count) - 1
+
+
+def _with(values: tuple[T, ...], index: int, value: T) -> tuple[T, ...]:
+    return (*values[:index], value, *values[index + 1 :])
+
+
+def _set_signal_mode(controller: RealManController, request: Request) -> None:
+    index, mode = _signal(request), _within(request, "IO_mode", 0, _LAST_MODE)
+    speed = (-1, -1)
+    if mode == _SPEED_MODE:
+        inner = request.inner("realtime_speed")
+        speed = _within(inner, "speed", 0, 100), _within(inner, "mode", 1, 2)
+    settings = controller.settings
+    modes, speeds = _with(settings.signal_modes, index, mode), _with(settings.signal_speeds, index, speed)
+    controller.change(replace(settings, signal_modes=modes, signal_speeds=speeds))
 
 
 def _set_output(controller: RealManController, request: Request) -> None:
-    index, state = _signal(request), int(request.flag("state"))
-    outputs = controller.settings.outputs
-    controller.change(replace(controller.settings, outputs=(*outputs[:index], state, *outputs[index + 1 :])))
+    index, state, settings = _signal(request), int(request.flag("state")), controller.settings
+    if settings.signal_modes[index] != OUTPUT_MODE:
+        raise InvalidValueError("IO_Num", index + 1, f"is an input; set_IO_mode {OUTPUT_MODE} makes it an output")
+    controller.change(replace(settings, outputs=_with(settings.outputs, index, state)))
+
+
+def _set_tool_signal_mode(controller: RealManController, request: Request) -> None:
+    index, mode, settings = _signal(request, TOOL_SIGNALS), _within(request, "state", 0, 1), controller.settings
+    controller.change(replace(settings, tool_signal_modes=_with(settings.tool_signal_modes, index, mode)))
+
+
+def _set_tool_output(controller: RealManController, request: Request) -> None:
+    index, state, settings = _signal(request, TOOL_SIGNALS), int(request.flag("state")), controller.settings
+    if settings.tool_signal_modes[index] != OUTPUT_MODE:
+        raise InvalidValueError("IO_Num", index + 1, f"is an input; set_tool_IO_mode {OUTPUT_MODE} makes it an output")
+    controller.change(replace(settings, tool_outputs=_with(settings.tool_outputs, index, state)))
+
+
+def _tool_signals(controller: RealManController, request: Request) -> dict[str, Any]:
+    modes, outputs = controller.settings.tool_signal_modes, controller.settings.tool_outputs
+    levels = [level if mode == OUTPUT_MODE else 0 for mode, level in zip(modes, outputs, strict=True)]
+    return {"state": "tool_IO_state", "IO_Mode": modes, "IO_State": levels}
+
+
+def _voltage_setter(name: str, types: tuple[int, ...]) -> Setter:
+    def run(controller: RealManController, request: Request) -> None:
+        value = request.integer("voltage_type")
+        if value not in types:
+            raise InvalidValueError("voltage_type", value, f"must be one of {', '.join(map(str, types))}")
+        controller.change(replace(controller.settings, **{name: value}))
+
+    return setter("state", run)
+
+
+def _set_default_program(controller: RealManController, request: Request) -> None:
+    number = _within(request, "id", 0, _LAST_PROGRAM)
+    controller.change(replace(controller.settings, default_program=number))
 
 
 def _input_levels(controller: RealManController) -> list[int]:
@@ -94,9 +158,11 @@ def _input_levels(controller: RealManController) -> list[int]:
 
 
 def _io_state(controller: RealManController, request: Request) -> dict[str, Any]:
-    index = _signal(request)
-    state = controller.settings.outputs[index]
-    return {"state": "IO_state", "IO_Num": index + 1, "IO_Mode": _OUTPUT_MODE, "IO_state": state}
+    index, settings = _signal(request), controller.settings
+    mode, (speed, trigger) = settings.signal_modes[index], settings.signal_speeds[index]
+    level = settings.outputs[index] if mode == OUTPUT_MODE else _input_levels(controller)[index]
+    answer = {"state": "IO_state", "IO_Num": index + 1, "IO_Mode": mode, "IO_state": level}
+    return answer | ({"realtime_speed": {"speed": speed, "mode": trigger}} if mode == _SPEED_MODE else {})
 
 
 def _set_push(controller: RealManController, request: Request) -> None:
@@ -143,10 +209,6 @@ def _accept(controller: RealManController, request: Request) -> None:
     del controller, request
 
 
-def _constant(**answer: object) -> Callable[[RealManController, Request], dict[str, Any]]:
-    return lambda controller, request: dict(answer)
-
-
 _TIPS = ("line_speed", "line_acc", "angular_speed", "angular_acc")
 
 SETTERS: dict[str, Setter] = {
@@ -164,10 +226,13 @@ SETTERS: dict[str, Setter] = {
     "clear_joint_odom": setter("clear_state", _accept),
     "set_init_pose": setter("init_pose", _set_init_pose),
     "set_install_pose": setter("set_state", _set_install_pose),
-    "set_IO_mode": setter("set_state", lambda controller, request: _signal(request)),
+    "set_IO_mode": setter("set_state", _set_signal_mode),
     "set_DO_state": setter("set_state", _set_output),
-    "set_voltage": setter("state", _accept),
-    "set_tool_voltage": setter("state", _accept),
+    "set_voltage": _voltage_setter("voltage", _VOLTAGES),
+    "set_tool_IO_mode": setter("set_state", _set_tool_signal_mode),
+    "set_tool_DO_state": setter("set_state", _set_tool_output),
+    "set_tool_voltage": _voltage_setter("tool_voltage", _TOOL_VOLTAGES),
+    "set_default_run_program": setter("set_state", _set_default_program),
     "set_realtime_push": setter("state", _set_push),
 }
 GETTERS: dict[str, Getter] = {
@@ -199,8 +264,18 @@ GETTERS: dict[str, Getter] = {
         "DO": controller.settings.outputs,
         "AO": [0] * SIGNALS,
     },
-    "get_voltage": _constant(state="voltage_state", voltage_type=0),
-    "get_tool_voltage": _constant(state="tool_voltage_state", voltage_type=0),
-    "get_tool_IO_state": _constant(state="tool_IO_state", IO_Mode=[0, 0], IO_State=[0, 0]),
+    "get_voltage": lambda controller, request: {
+        "state": "voltage_state",
+        "voltage_type": controller.settings.voltage,
+    },
+    "get_tool_voltage": lambda controller, request: {
+        "state": "tool_voltage_state",
+        "voltage_type": controller.settings.tool_voltage,
+    },
+    "get_tool_IO_state": _tool_signals,
+    "get_default_run_program": lambda controller, request: {
+        "command": "get_default_run_program",
+        "id": controller.settings.default_program,
+    },
     "get_realtime_push": _push,
 }

@@ -32,6 +32,10 @@ MOST_FRAMES: Final = 10
 """Of either kind, as of the real controller."""
 SIGNALS: Final = len(INPUTS)
 """Digital inputs and outputs of the controller."""
+TOOL_SIGNALS: Final = 2
+"""Digital ports of the tool's flange, each input or output."""
+OUTPUT_MODE: Final = 1
+"""Mode of a port that is an output; the others are inputs, most of them with a function."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -126,7 +130,17 @@ class Settings:
     is_fenced: bool = False
     fence_side: Side = "inside"
     """Of the fence, where the arm has to be."""
+    signal_modes: tuple[int, ...] = (OUTPUT_MODE,) * SIGNALS
+    signal_speeds: tuple[tuple[int, int], ...] = ((-1, -1),) * SIGNALS
+    """Speed and trigger of a port that changes the speed; -1 where it does not."""
     outputs: tuple[int, ...] = (0,) * SIGNALS
+    tool_signal_modes: tuple[int, ...] = (0,) * TOOL_SIGNALS
+    tool_outputs: tuple[int, ...] = (0,) * TOOL_SIGNALS
+    voltage: int = 0
+    """Type of the power output of the controller, see `set_voltage`."""
+    tool_voltage: int = 0
+    default_program: int = 0
+    """Of the input that starts a program; 0 is none."""
     init_pose: tuple[int, ...] = ()
     """[0.001 deg]."""
     install_pose: tuple[int, ...] = (0, 0, 0)

@@ -71,6 +71,21 @@ def motions(robot: Any, n: int) -> dict[str, Any]:
     return found
 
 
+def signals(robot: Any, n: int) -> dict[str, Any]:
+    """Sets ports of controller and tool, as the maker's example on them does, and reads them back."""
+    return {
+        "functions": [robot.rm_set_io_mode(port, mode) for port, mode in ((1, 2), (2, 3), (3, 4), (4, 5))],
+        "start": robot.rm_get_io_state(1),
+        "input set": robot.rm_set_do_state(1, 1),
+        "speed": [robot.rm_set_io_mode(1, 14, 50, 1), robot.rm_get_io_state(1)],
+        "output": [robot.rm_set_io_mode(2, 1), robot.rm_set_do_state(2, 1), robot.rm_get_io_output()],
+        "inputs": robot.rm_get_io_input(),
+        "voltage": [robot.rm_set_voltage(3, True), robot.rm_get_voltage()],
+        "tool": [robot.rm_set_tool_IO_mode(1, 1), robot.rm_set_tool_do_state(1, 1), robot.rm_get_tool_io_state()],
+        "tool voltage": [robot.rm_set_tool_voltage(3), robot.rm_get_tool_voltage()],
+    }
+
+
 def five(host: str, ports: list[int]) -> dict[str, Any]:
     """Drives several robots, and receives the states that one pushes."""
     from Robotic_Arm.rm_robot_interface import (
@@ -119,7 +134,7 @@ def main() -> None:
     robot = RoboticArm(rm_thread_mode_e(mode))
     handle = robot.rm_create_robot_arm(host, port, 3)
     info = robot.rm_get_robot_info()[1]
-    found = {"joint_commands": joint_commands, "motions": motions}[part](robot, info["arm_dof"])
+    found = {"joint_commands": joint_commands, "motions": motions, "signals": signals}[part](robot, info["arm_dof"])
     robot.rm_delete_robot_arm()
     print("FOUND", json.dumps({"id": handle.id, "info": info, **found}, default=str), flush=True)
 

@@ -83,6 +83,21 @@ def test_motions_end_where_they_should_and_refusals_are_seen(served: tuple[str, 
     assert found["stop"] == [0, 0, 0, 0]
 
 
+def test_ports_and_voltages_are_read_back_as_they_were_set(served: tuple[str, Process], tmp_path: Path):
+    _, process = served
+    found = run(process, "triple", "signals", tmp_path)
+    assert found["functions"] == [0, 0, 0, 0]
+    assert found["start"][1]["io_config"]["io_mode"] == 2
+    assert found["input set"] == 1
+    code, (_, port) = found["speed"]
+    assert code == 0
+    assert port["io_config"] == {"io_mode": 14, "io_real_time_config_t": {"speed": 50, "mode": 1}}
+    assert found["output"] == [0, 0, [0, [0, 1, 0, 0]]]
+    assert found["inputs"] == [0, [0, 0, 0, 0]]
+    assert found["voltage"] == found["tool voltage"] == [0, [0, 3]]
+    assert found["tool"] == [0, 0, {"return_code": 0, "IO_Mode": [1, 0], "IO_state": [1, 0]}]
+
+
 def test_one_program_has_five_robots_of_both_generations_and_receives_their_states(tmp_path: Path):
     options = [[], [], [], ["--generation", "4"], ["--generation", "4"]]
     with ExitStack() as stack:

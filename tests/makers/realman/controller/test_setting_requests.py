@@ -1,0 +1,46 @@
+"""Digital ports of controller and tool, and power outputs: what is set is read back, what makes no sense is refused."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.makers.realman.controller.bench import Bench
+
+
+def test_a_port_has_the_mode_that_was_set_and_only_an_output_is_set():
+    bench = Bench()
+    assert bench.ask("get_IO_state", IO_Num=3) == {"state": "IO_state", "IO_Num": 3, "IO_Mode": 1, "IO_state": 0}
+    bench.ask("set_DO_state", IO_Num=3, state=1)
+    assert bench.ask("get_IO_state", IO_Num=3)["IO_state"] == 1
+    assert bench.ask("set_IO_mode", IO_Num=3, IO_mode=2)["set_state"] is True
+    assert bench.ask("get_IO_state", IO_Num=3) == {"state": "IO_state", "IO_Num": 3, "IO_Mode": 2, "IO_state": 0}
+    bench.controller.set_input(2, True)
+    assert bench.ask("get_IO_state", IO_Num=3)["IO_state"] == 1
+    assert bench.ask("set_DO_state", IO_Num=3, state=0)["set_state"] is False
+    assert "set_IO_mode" in bench.logged[-1][1]
+
+
+def test_a_port_that_changes_the_speed_keeps_speed_and_trigger():
+    bench = Bench()
+    assert bench.ask("set_IO_mode", IO_Num=1, IO_mode=14)["set_state"] is False
+    speed = {"speed": 50, "mode": 1}
+    assert bench.ask("set_IO_mode", IO_Num=1, IO_mode=14, realtime_speed=speed)["set_state"] is True
+    assert bench.ask("get_IO_state", IO_Num=1)["realtime_speed"] == speed
+    assert bench.ask("set_IO_mode", IO_Num=1, IO_mode=15)["set_state"] is False
+
+
+def test_a_port_of_the_tool_is_input_or_output():
+    bench = Bench()
+    assert bench.ask("set_tool_DO_state", IO_Num=2, state=1)["set_state"] is False
+    assert bench.ask("set_tool_IO_mode", IO_Num=2, state=1)["set_state"] is True
+    assert bench.ask("set_tool_DO_state", IO_Num=2, state=1)["set_state"] is True
+    assert bench.ask("get_tool_IO_state") == {"state": "tool_IO_state", "IO_Mode": [0, 1], "IO_State": [0, 1]}
+    assert bench.ask("set_tool_IO_mode", IO_Num=3, state=1)["set_state"] is False
+
+
+@pytest.mark.parametrize(("kind", "refused"), [("voltage", 1), ("tool_voltage", 4)])
+def test_a_voltage_is_read_back(kind: str, refused: int):
+    bench = Bench()
+    assert bench.ask(f"set_{kind}", voltage_type=3)["state"] is True
+    assert bench.ask(f"set_{kind}", voltage_type=refused)["state"] is False
+    assert bench.ask(f"get_{kind}") == {"state": f"{kind}_state", "voltage_type": 3}
