@@ -295,11 +295,15 @@ def _teach(controller: RealManController, twist: np.ndarray) -> None:
 
 def _pause(controller: RealManController, request: Request) -> None:
     controller.drive.planner.pause()
+    if controller.program is not None:
+        controller.program.is_paused = True
 
 
 def _continue(controller: RealManController, request: Request) -> None:
     controller.require_ready()
     controller.drive.planner.resume()
+    if controller.program is not None:
+        controller.program.is_paused = False
 
 
 def _require_paused(controller: RealManController) -> None:

@@ -26,6 +26,7 @@ from rcilab.makers.realman.controller.fault_of import REFUSALS, errors_of
 from rcilab.makers.realman.controller.fence import FenceWatch
 from rcilab.makers.realman.controller.flash import Flash
 from rcilab.makers.realman.controller.joint_parameters import RECOMMENDED_RATIO, JointParameters, require_joint
+from rcilab.makers.realman.controller.programs import Program, RunningProgram
 from rcilab.makers.realman.controller.reporter import report_state
 from rcilab.makers.realman.controller.settings import SIGNALS, Settings, ToolFrame
 from rcilab.makers.realman.controller.trajectories import Trajectory, TrajectoryQueue
@@ -69,6 +70,12 @@ class RealManController:
         is_real: Whether motions move the arm; otherwise they are only shown.
         streamed: What clients stream, "joint" or "pose", while they do; else "".
         is_teaching: Whether the arm moves until the end of a teach command.
+        is_dragging: Whether drag teaching is on: the arm takes no motion.
+        records: Whether drag teaching is recorded.
+        recorded: The points of the last recording, [0.001 deg].
+        programs: Those that are stored, by number.
+        program: The one that runs.
+        default_program: Number of the one that an input starts; 0 is none.
         reason: Reason for the last error.
         state: The last state.
         on_end: Called with a trajectory that has ended, and whether it reached its end.
@@ -101,7 +108,11 @@ class RealManController:
         self.system_errors: tuple[RealManError, ...] = ()
         self.is_powered = self.is_real = True
         self.streamed = ""
-        self.is_teaching = False
+        self.is_teaching = self.is_dragging = self.records = False
+        self.recorded: list[list[int]] = []
+        self.programs: dict[int, Program] = {}
+        self.program: RunningProgram | None = None
+        self.default_program = 0
         self._needs_configuration = True
         self._tool = self.settings.tool  # As configured.
         self.reason = Remark("")
@@ -331,6 +342,8 @@ class RealManController:
             InvalidValueError: A joint is disabled or has an error, an error is set, or the emergency stop is pressed.
         """
         lasting = [error for error in self.system_errors if error not in _TRANSIENT]
+        if self.is_dragging:
+            raise InvalidValueError("motion", "", "is not possible: drag teaching is on; stop_drag_teach ends it")
         if self.button != "none":
             raise InvalidValueError("motion", "", "is not possible: the emergency stop is pressed")
         if lasting:
@@ -356,7 +369,7 @@ class RealManController:
     def add_all(self, targets: list[Target]) -> None:
         """Passes targets to the planner."""
         if targets:
-            self.streamed, self.is_teaching = "", False
+            self.streamed, self.is_teaching, self.program = "", False, None
         for target in targets:
             self.drive.planner.add(target)
 
@@ -364,13 +377,13 @@ class RealManController:
         """Stops on the path, and discards all trajectories."""
         self.trajectories.clear()
         self.drive.planner.end()
-        self.streamed, self.is_teaching = "", False
+        self.streamed, self.is_teaching, self.program = "", False, None
 
     def stop_at_once(self) -> None:
         """Stops every joint as fast as its limits allow, and discards all trajectories."""
         self.trajectories.clear()
         self.drive.planner.stop()
-        self.streamed, self.is_teaching = "", False
+        self.streamed, self.is_teaching, self.program = "", False, None
 
     def step(self) -> RobotState:
         """Advances by one cycle and returns the state at its end."""
@@ -424,7 +437,7 @@ class RealManController:
 
     def _end_all(self) -> None:
         """Reports the end of every trajectory that a fault has discarded."""
-        self.streamed, self.is_teaching = "", False
+        self.streamed, self.is_teaching, self.program = "", False, None
         self.trajectories.clear()
         for trajectory in self.trajectories.pop_all():
             self.on_end(trajectory, False, False)

@@ -15,6 +15,7 @@ from rcilab.makers.realman.controller import (
     frame_requests,
     joint_requests,
     motion_requests,
+    program_requests,
     setting_requests,
     state_requests,
 )
@@ -25,14 +26,22 @@ from rcilab.makers.realman.controller.push import encode_push
 from rcilab.makers.realman.controller.realman_controller import RealManController
 from rcilab.makers.realman.controller.stream_requests import STREAMS
 from rcilab.makers.realman.controller.trajectories import Trajectory
-from rcilab.makers.realman.wire.line import LineReader, Request, decode_request, encode_answer
+from rcilab.makers.realman.wire.line import LineReader, Request, decode_request, encode_answer, file_size
 from rcilab.sim.channels import ClientLink, Peer, TcpChannel, UdpChannel
 from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.virtual_arm import VirtualArm
 
 _PROTOCOL = "RealMan's JSON protocol"
 _MOST_CLIENTS = 8
-_PARTS = (joint_requests, state_requests, frame_requests, motion_requests, setting_requests, fence_requests)
+_PARTS = (
+    joint_requests,
+    state_requests,
+    frame_requests,
+    motion_requests,
+    program_requests,
+    setting_requests,
+    fence_requests,
+)
 SETTERS: dict[str, Setter] = {name: setter for part in _PARTS for name, setter in getattr(part, "SETTERS", {}).items()}
 GETTERS: dict[str, Getter] = {name: getter for part in _PARTS for name, getter in part.GETTERS.items()}
 
@@ -68,13 +77,17 @@ class RealManServer:
         self._link: ClientLink
         self._peers: list[Peer] = []
         self._pushed_to: tuple[Peer, int] | None = None
+        self._files: dict[Peer, Request] = {}  # Announced, by client.
         controller.on_end = self._report_end
         controller.on_log = self._log
 
     @property
     def is_quiet(self) -> bool:
         """Whether nothing moves and nothing is pushed."""
-        return not (self.controller.is_moving or self.controller.settings.push.enable)
+        controller = self.controller
+        return not (
+            controller.is_moving or controller.program or controller.is_dragging or controller.settings.push.enable
+        )
 
     def attach(self, link: ClientLink) -> None:
         """Sets the link to clients."""
@@ -87,12 +100,17 @@ class RealManServer:
     def disconnect(self, peer: Peer) -> bool:
         """Forgets a client; its motions continue."""
         self._peers.remove(peer)
+        self._files.pop(peer, None)
         if self._pushed_to is not None and self._pushed_to[0] is peer:
             self._pushed_to = None
         return False
 
     def receive(self, peer: Peer, frame: bytes) -> None:
-        """Handles a line."""
+        """Handles a line, or a file."""
+        if peer in self._files:
+            request = self._files.pop(peer)
+            self._answer(peer, program_requests.receive_program(self.controller, request, frame, peer))
+            return
         try:
             request = decode_request(frame)
         except DecodeError as error:
@@ -105,6 +123,11 @@ class RealManServer:
             self._stream(request)
         elif name == "get_arm_software_info":
             self._answer(peer, software_info(self.controller.model.name, self._generation))
+        elif name == "run_project":
+            self._announce_file(peer, request)
+        elif name == "save_trajectory":
+            for line in program_requests.recorded_lines(self.controller):
+                self._answer(peer, line)
         elif name in GETTERS:
             self._get(peer, request, GETTERS[name])
         else:
@@ -117,6 +140,10 @@ class RealManServer:
     def step(self, *, is_sent: bool = True) -> None:
         """Advances by one cycle."""
         self.controller.step()
+        running = self.controller.program
+        event = program_requests.advance_program(self.controller)
+        if event is not None and running is not None and running.peer in self._peers:
+            self._answer(running.peer, event)
 
     def send_states(self) -> None:
         """Pushes the state when its period is over."""
@@ -153,6 +180,17 @@ class RealManServer:
         except InvalidValueError as error:
             text = f"{request.command} was refused: {error}"
             self._link.log("refused", text, request=request.command, status="REFUSED")
+
+    def _announce_file(self, peer: Peer, request: Request) -> None:
+        is_taken = True
+        try:
+            file_size(request)
+        except InvalidValueError as error:
+            is_taken = False
+            self._link.log("refused", f"run_project was refused: {error}", request="run_project", status="REFUSED")
+        else:
+            self._files[peer] = request
+        self._answer(peer, {"command": "run_project", "project_state": is_taken})
 
     def _stream(self, request: Request) -> None:
         try:

@@ -28,7 +28,6 @@ _LAST_MODE = 14
 _SPEED_MODE = 14
 _VOLTAGES = (0, 2, 3)  # 0 V, 12 V, 24 V.
 _TOOL_VOLTAGES = (0, 1, 2, 3)  # And 5 V.
-_LAST_PROGRAM = 100
 
 
 def _tip_setter(name: str) -> Setter:
@@ -147,11 +146,6 @@ def _voltage_setter(name: str, types: tuple[int, ...]) -> Setter:
     return setter("state", run)
 
 
-def _set_default_program(controller: RealManController, request: Request) -> None:
-    number = _within(request, "id", 0, _LAST_PROGRAM)
-    controller.change(replace(controller.settings, default_program=number))
-
-
 def _input_levels(controller: RealManController) -> list[int]:
     high = controller.inputs
     return [int(number in high) for number in range(SIGNALS)]
@@ -232,7 +226,6 @@ SETTERS: dict[str, Setter] = {
     "set_tool_IO_mode": setter("set_state", _set_tool_signal_mode),
     "set_tool_DO_state": setter("set_state", _set_tool_output),
     "set_tool_voltage": _voltage_setter("tool_voltage", _TOOL_VOLTAGES),
-    "set_default_run_program": setter("set_state", _set_default_program),
     "set_realtime_push": setter("state", _set_push),
 }
 GETTERS: dict[str, Getter] = {
@@ -273,9 +266,5 @@ GETTERS: dict[str, Getter] = {
         "voltage_type": controller.settings.tool_voltage,
     },
     "get_tool_IO_state": _tool_signals,
-    "get_default_run_program": lambda controller, request: {
-        "command": "get_default_run_program",
-        "id": controller.settings.default_program,
-    },
     "get_realtime_push": _push,
 }

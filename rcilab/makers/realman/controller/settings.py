@@ -139,8 +139,6 @@ class Settings:
     voltage: int = 0
     """Type of the power output of the controller, see `set_voltage`."""
     tool_voltage: int = 0
-    default_program: int = 0
-    """Of the input that starts a program; 0 is none."""
     init_pose: tuple[int, ...] = ()
     """[0.001 deg]."""
     install_pose: tuple[int, ...] = (0, 0, 0)

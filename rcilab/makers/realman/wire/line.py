@@ -10,15 +10,23 @@ import msgspec
 from rcilab.core.errors import DecodeError, InvalidValueError
 
 LONGEST_LINE = 65536  # [bytes] Far beyond any request of the interface.
+LONGEST_FILE = 200_000  # [bytes] Of a program, about 4000 points; rcilab's own value.
 _END = b"\r\n"
+_REQUEST = b'{"command"'
 _LARGEST = 2**31  # Integers of clients have 32 bits.
 
 
 class LineReader:
-    """Splits the bytes of a connection at CR LF. A line that ends with LF alone is not complete, as on a real arm."""
+    """Splits the bytes of a connection at CR LF. A line that ends with LF alone is not complete, as on a real arm.
+
+    Behind a line that announces a file, the file is one frame, whatever it contains. What is sent behind it, before the
+    next request, is dropped: the client library 1.1.6 adds some bytes of its buffer.
+    """
 
     def __init__(self) -> None:
         self._rest = b""
+        self._file = 0  # [bytes] Of the file that follows.
+        self._is_behind_file = False
 
     def feed(self, data: bytes) -> list[bytes]:
         """Processes bytes and returns the complete lines, without their ends.
@@ -26,10 +34,31 @@ class LineReader:
         Raises:
             DecodeError: A line is too long.
         """
-        *lines, self._rest = (self._rest + data).split(_END)
-        if len(self._rest) > LONGEST_LINE or any(len(line) > LONGEST_LINE for line in lines):
+        self._rest += data
+        frames: list[bytes] = []
+        while (frame := self._take()) is not None:
+            if frame:
+                frames.append(frame)
+        return frames
+
+    def _take(self) -> bytes | None:
+        """Returns the next frame, which is empty for an empty line; None if it is not complete."""
+        if self._file:
+            if len(self._rest) < self._file:
+                return None
+            file, self._rest, self._file = self._rest[: self._file], self._rest[self._file :], 0
+            self._is_behind_file = True
+            return file
+        line, end, rest = self._rest.partition(_END)
+        if len(line) > LONGEST_LINE:
             raise DecodeError(f"a line is longer than {LONGEST_LINE} bytes; every line ends with CR LF")
-        return [line for line in lines if line]
+        if not end:
+            return None
+        if self._is_behind_file:
+            line = line[max(line.find(_REQUEST), 0) :]
+            self._is_behind_file = False
+        self._rest, self._file = rest, _announced_file(line)
+        return line
 
 
 class Request(NamedTuple):
@@ -104,6 +133,28 @@ def decode_request(line: bytes) -> Request:
     if not isinstance(command, str):
         raise DecodeError("no object with a command")
     return Request(command, content)
+
+
+def file_size(request: Request) -> int:
+    """Returns the size of the file that a request announces, [bytes].
+
+    Raises:
+        InvalidValueError: It is missing, or is not 1 to `LONGEST_FILE`; then no file follows.
+    """
+    size = request.integer("file_size")
+    if not 1 <= size <= LONGEST_FILE:
+        raise InvalidValueError("file_size", size, f"must be 1 to {LONGEST_FILE} bytes")
+    return size
+
+
+def _announced_file(line: bytes) -> int:
+    if b"run_project" not in line:
+        return 0
+    try:
+        request = decode_request(line)
+        return file_size(request) if request.command == "run_project" else 0
+    except (DecodeError, InvalidValueError):
+        return 0
 
 
 def encode_answer(answer: Mapping[str, object]) -> bytes:

@@ -86,6 +86,34 @@ def signals(robot: Any, n: int) -> dict[str, Any]:
     }
 
 
+def program(robot: Any, n: int) -> dict[str, Any]:
+    """Records, sends and runs a program, as the maker's example on programs does."""
+    from Robotic_Arm.rm_robot_interface import rm_send_project_t
+
+    found: dict[str, Any] = {"dragged": [robot.rm_start_drag_teach(1)]}
+    time.sleep(0.2)
+    found["dragged"].append(robot.rm_stop_drag_teach())
+    found["saved"] = robot.rm_save_trajectory("recorded.txt")
+    q = [round(1000.0 * angle) for angle in robot.rm_get_joint_degree()[1][:n]]
+    lines = [{"file": n}, {"name": "Folder", "num": 1, "type": 100, "enabled": True, "parent_number": 0}]
+    lines += [{"point": [q[0] + 50 * k, *q[1:]]} for k in range(100)]
+    with open("program.txt", "w", encoding="ascii") as file:
+        file.writelines(json.dumps(line) + "\n" for line in lines)
+    found["stored"] = robot.rm_send_project(rm_send_project_t("program.txt", 100, 1, 5, 0, 0, 0))
+    found["sent"] = robot.rm_send_project(rm_send_project_t("program.txt", 50, 0, 6, 0, 0, 0))
+    found["running"] = robot.rm_get_program_run_state()[1]["run_state"]
+    found["paused"] = [robot.rm_set_arm_pause(), robot.rm_get_program_run_state()[1]["run_state"]]
+    found["continued"] = robot.rm_set_arm_continue()
+    while robot.rm_get_program_run_state()[1]["run_state"]:
+        time.sleep(0.1)
+    found["moved"] = robot.rm_get_joint_degree()[1][0] - q[0] / 1000.0
+    found["listed"] = [entry["id"] for entry in robot.rm_get_program_trajectory_list(1, 10, "")[1]["trajectory_list"]]
+    found["run by number"] = robot.rm_set_program_id_run(5, 0, 1)
+    found["default"] = [robot.rm_set_default_run_program(5), robot.rm_get_default_run_program()]
+    found["deleted"] = robot.rm_delete_program_trajectory(5)
+    return found
+
+
 def five(host: str, ports: list[int]) -> dict[str, Any]:
     """Drives several robots, and receives the states that one pushes."""
     from Robotic_Arm.rm_robot_interface import (
@@ -134,7 +162,9 @@ def main() -> None:
     robot = RoboticArm(rm_thread_mode_e(mode))
     handle = robot.rm_create_robot_arm(host, port, 3)
     info = robot.rm_get_robot_info()[1]
-    found = {"joint_commands": joint_commands, "motions": motions, "signals": signals}[part](robot, info["arm_dof"])
+    found = {"joint_commands": joint_commands, "motions": motions, "signals": signals, "program": program}[part](
+        robot, info["arm_dof"]
+    )
     robot.rm_delete_robot_arm()
     print("FOUND", json.dumps({"id": handle.id, "info": info, **found}, default=str), flush=True)
 

@@ -98,6 +98,24 @@ def test_ports_and_voltages_are_read_back_as_they_were_set(served: tuple[str, Pr
     assert found["tool"] == [0, 0, {"return_code": 0, "IO_Mode": [1, 0], "IO_state": [1, 0]}]
 
 
+def test_a_program_is_recorded_stored_and_run(served: tuple[str, Process], tmp_path: Path):
+    _, process = served
+    found = run(process, "triple", "program", tmp_path)
+    assert found["dragged"] == [0, 0]
+    code, count = found["saved"]
+    assert code == 0
+    assert count == len((tmp_path / "recorded.txt").read_text().splitlines()) > 0
+    assert found["stored"] == found["sent"] == [0, -1]
+    assert found["running"] == 1
+    assert found["paused"] == [0, 2]
+    assert found["continued"] == 0
+    assert found["moved"] == pytest.approx(4.95, abs=0.05)
+    assert found["listed"] == [5, 6]
+    assert found["run by number"] == 0
+    assert found["default"] == [0, [0, 5]]
+    assert found["deleted"] == 0
+
+
 def test_one_program_has_five_robots_of_both_generations_and_receives_their_states(tmp_path: Path):
     options = [[], [], [], ["--generation", "4"], ["--generation", "4"]]
     with ExitStack() as stack:

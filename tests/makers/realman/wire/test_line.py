@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcilab.core.errors import DecodeError, InvalidValueError
-from rcilab.makers.realman.wire.line import LONGEST_LINE, LineReader, decode_request, encode_answer
+from rcilab.makers.realman.wire.line import LONGEST_FILE, LONGEST_LINE, LineReader, decode_request, encode_answer
 from tests.makers.realman.controller.bench import Bench
 
 LINES = [b'{"command":"movej"}', b'{"command":"get_joint_degree"}', b"{}"]
@@ -34,6 +34,22 @@ def test_a_bare_line_feed_ends_no_line_and_a_line_without_end_is_too_long():
         decode_request(line)
     with pytest.raises(DecodeError, match="CR LF"):
         reader.feed(b"x" * (LONGEST_LINE + 1))
+
+
+@given(st.lists(st.integers(1, 60)))
+def test_an_announced_file_is_one_frame_however_it_is_cut(cuts):
+    announced = b'{"command":"run_project","file_size":8}'
+    data, reader, found = announced + b"\r\nab\r\ncd\r\n -2{A|" + LINES[0] + b"\r\n", LineReader(), []
+    while data:
+        size = cuts.pop() if cuts else len(data)
+        found += reader.feed(data[:size])
+        data = data[size:]
+    assert found == [announced, b"ab\r\ncd\r\n", LINES[0]]
+
+
+def test_a_file_of_an_impossible_size_does_not_follow():
+    refused = b'{"command":"run_project","file_size":%d}' % (LONGEST_FILE + 1)
+    assert LineReader().feed(refused + b"\r\n" + LINES[0] + b"\r\n") == [refused, LINES[0]]
 
 
 @pytest.mark.parametrize("line", [b"", b"[]", b"{", b'{"command":1}', b"\xff", b"[" * 50000, b'"command"', b"NaN"])
@@ -84,6 +100,7 @@ FIELDS = sorted(
         "joint pose v r trajectory_connect loop offset frame_type joint_step step step_type teach_type direction "
         "teach_joint joint_max_speed joint_min_pos joint_en_state joint_zero_pos joint_clear_err limit_mode frame_name "
         "frame_pose tool_name tool_pose payload position cycle port enable ip custom IO_Num state mode arm_power "
+        "id speed trajectory_record voltage_type IO_mode realtime_speed vague_search page_num page_size "
         "arm_line_speed collision_stage radio trajectory_mode follow cartesian_velocity pose_quat"
     ).split()
 )
