@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import suppress
 
 from rcilab.core.errors import CommandRejectedError, ConnectionLostError
@@ -12,6 +13,12 @@ from rcilab.makers.realman.driver.client import RealManClient
 from rcilab.makers.realman.driver.push_receiver import NumberedPush, PushReceiver
 from rcilab.makers.realman.driver.state_reader import StateReader, is_enabled
 from rcilab.makers.realman.wire.units import pose_from_client
+
+_SILENCE = 300_000_000  # [ns] Without a state, after which the controller is asked where it pushes them.
+_TAKEN = (
+    "its states go to another client, because a controller pushes them to one address only; close the other client, "
+    "and connect again"
+)
 
 
 class RealManConnection(LibraryConnection[NumberedPush]):
@@ -35,6 +42,18 @@ class RealManConnection(LibraryConnection[NumberedPush]):
         self._reader = StateReader(n)
         client.push_states(receiver.port)
         self.read_work_frame()
+
+    def poll(self, timeout: float) -> list[RobotState]:
+        """Returns every state that has arrived, oldest first; waits up to a timeout, [s], for the first.
+
+        Raises:
+            ConnectionLostError: The controller does not answer, or pushes its states to another client.
+        """
+        states = super().poll(timeout)
+        is_silent = not states and time.monotonic_ns() - self.received_ns > _SILENCE
+        if is_silent and timeout > 0.0 and not self.is_streaming and self.client.pushed_port() != self._receiver.port:
+            raise ConnectionLostError(f"{self.name}: {_TAKEN}")
+        return states
 
     def read_work_frame(self) -> None:
         """Asks for the current work frame, in which poses are reported."""

@@ -139,3 +139,11 @@ def test_a_missing_library_is_one_sentence(monkeypatch):
         MissingExtraError, match=r"driving a RealMan arm needs Robotic_Arm, which is not installed: pip"
     ):
         connect("realman://127.9.9.9", load_model("RM65"))
+
+
+def test_a_session_whose_states_another_one_takes_names_the_reason(controller):
+    with connect(controller.address) as first, connect(controller.address) as second:
+        with pytest.raises(ConnectionLostError, match=r"states go to another client.* connect again"):
+            first.receive_state()
+        first.close()
+        assert second.receive_state().q.shape == (7,)
