@@ -11,8 +11,9 @@ import gc
 import logging
 import os
 import resource
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -70,6 +71,21 @@ def leave_realtime() -> None:
     ctypes.CDLL(None).munlockall()
     gc.unfreeze()
     gc.enable()
+
+
+def set_thread_scheduling(thread: threading.Thread, *, like_caller: bool) -> None:
+    """Gives another thread of this process the scheduling of the calling one, or an ordinary one, as far as allowed.
+
+    Args:
+        thread: A running thread; one that has ended is left alone.
+        like_caller: Which of the two.
+    """
+    if not thread.is_alive() or thread.native_id is None:
+        return
+    ordinary = os.SCHED_OTHER, os.sched_param(0)
+    policy, parameters = (os.sched_getscheduler(0), os.sched_getparam(0)) if like_caller else ordinary
+    with suppress(OSError):
+        os.sched_setscheduler(thread.native_id, policy, parameters)
 
 
 @contextmanager

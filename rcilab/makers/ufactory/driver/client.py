@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -11,6 +12,7 @@ from rcilab.core.errors import CommandRejectedError, ConnectionLostError
 from rcilab.makers.ufactory.driver.library import load_client_library
 from rcilab.makers.ufactory.driver.links import Endpoint
 from rcilab.makers.ufactory.errors import UfactoryError
+from rcilab.realtime.scheduling import set_thread_scheduling
 
 _TIMEOUT = 1.0  # [s] For an answer; the library's own is 2 s.
 _SHORT_TIMEOUT = 0.4  # [s] In a motion, which no state reaches meanwhile; a control process must answer within 1 s.
@@ -19,6 +21,7 @@ _UNREADY, _OUT_OF_RANGE = -2, -8  # Of the library itself.
 _LOST = (-1, 11)
 _FIRST_REPORT = 2.0  # [s]
 _PAUSE = 0.005  # [s]
+_ANSWERS = "main-socket"  # The library's name for the connection on which it receives answers.
 
 
 class SlowReport(NamedTuple):
@@ -60,11 +63,14 @@ class XArmClient:
         self.api.register_report_callback(
             self._receive, report_cartesian=False, report_joints=False, report_mtbrake=False, report_cmd_num=False
         )
+        before = set(threading.enumerate())
         try:
             self.api.connect()
         except Exception as error:  # The library raises the base class.
             self.close()
             raise ConnectionLostError(f"{name}: the client library does not connect ({error}); try again") from error
+        new = set(threading.enumerate()) - before
+        self._readers = [thread for thread in new if getattr(thread, "port_type", "") == _ANSWERS]
         self.hurry(False)
         deadline = time.monotonic() + _FIRST_REPORT
         while self.slow is None:
@@ -137,9 +143,15 @@ class XArmClient:
             raise self.refusal("set_state")
 
     def hurry(self, on: bool) -> None:
-        """Waits less long for answers from here on, or as long as usual."""
+        """Waits less long for answers from here on, or as long as usual.
+
+        Meanwhile the thread in which the library receives them has the scheduling of the calling one, which waits for
+        it: otherwise any ordinary process could delay a stream in real time.
+        """
         self._timeout = _SHORT_TIMEOUT if on else _TIMEOUT
         self.api.set_timeout(self._timeout)
+        for thread in self._readers:
+            set_thread_scheduling(thread, like_caller=on)
 
     def close(self) -> None:
         """Ends the connection. May be called twice."""

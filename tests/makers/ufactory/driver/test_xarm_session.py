@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 
 import numpy as np
@@ -93,6 +94,20 @@ def test_a_callback_begins_at_the_arm_and_its_last_command_is_reached(robot):
     assert robot.state.robot_mode is RobotMode.IDLE
     with pytest.raises(ModelError, match="has no torque mode"):
         robot.control(lambda state, t: JointPosition(state.q_c), "torque")
+
+
+def test_the_library_receives_answers_with_the_scheduling_of_the_loop(robot):
+    readers = [thread for thread in threading.enumerate() if getattr(thread, "port_type", "") == "main-socket"]
+    assert readers
+    ordinary, seen = os.sched_getscheduler(0), []
+
+    def stay(state, t):
+        seen.append({os.sched_getscheduler(ident) for ident in (0, *(reader.native_id for reader in readers))})
+        return JointPosition(HOME, finished=len(seen) == 10)
+
+    robot.control(stay)
+    assert all(len(policies) == 1 for policies in seen)
+    assert {os.sched_getscheduler(reader.native_id) for reader in readers} == {ordinary}
 
 
 def test_an_error_ends_a_motion_with_its_name_and_recover_clears_it(robot):
