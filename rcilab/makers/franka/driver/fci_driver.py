@@ -213,20 +213,26 @@ class FciDriver:
     def begin(self, mode: ControllerMode) -> None:
         """Begins a motion (Move), and returns once the controller has begun it.
 
+        It returns also if a fault has ended the motion since, such as a reflex: the next states show it.
+
         Raises:
             InvalidValueError: It is not a mode for motions.
         """
         if mode not in _GENERATORS:
             known = [known.name for known in _GENERATORS]
             raise InvalidValueError("mode", mode, f"is not a mode to move in; there are {known}")
+        self.poll(0.0)
+        was_faulty = bool(self._latest.faults)
         try:
             self._client.begin(mode)
         except CommandRejectedError as refusal:
-            self.poll(_FRESH)
+            for timeout in (0.0, _FRESH):  # The newest state may be from before the refusal.
+                self.poll(timeout)
             reason = find_reason(self._client)
             if reason is None:
                 raise
-            raise refusal_of("Move", reason) from refusal.__cause__
+            if was_faulty or not self._latest.faults:
+                raise refusal_of("Move", reason) from refusal.__cause__
         self._shown = mode, _GENERATORS[mode]
 
     def has_begun(self, state: RobotState) -> bool:
