@@ -49,6 +49,7 @@ def advise(
     is_isolated: bool = True,
     soft_limit: float | None = None,
     is_near_end: bool = False,
+    is_record: bool = False,
 ) -> Phrase:
     """Returns the remedy for a violation.
 
@@ -62,6 +63,7 @@ def advise(
         is_isolated: Whether the values before and after these samples are far from the worst one.
         soft_limit: The soft limit that the joint exceeds, [rad]; None if it exceeds the arm's own range.
         is_near_end: Whether the bound is lower than elsewhere, because the joint is near the end of its range.
+        is_record: Whether the motion was recorded: values of a plan are not measured.
     """
     if condition.stage == "start" and condition.signal == "torque":
         return Phrase("advice.torque.rate")
@@ -69,7 +71,7 @@ def advise(
         return Phrase("advice.start.position" if condition.order == 0 else "advice.start.rest")
     if condition.stage == "end":
         return Phrase("advice.end.rest")
-    if condition.is_measured:
+    if condition.is_measured and is_record:
         return Phrase("advice.measured")
     if condition.signal == "torque":
         return _torque_advice(condition, motion)

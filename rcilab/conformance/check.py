@@ -392,6 +392,7 @@ class _MotionChecker:
             is_isolated=_is_isolated(values[:, column], begin, end, value),
             soft_limit=soft_limit,
             is_near_end=bool(is_near_end),
+            is_record=self._is_record,
         )
         return Violation(
             condition=condition,

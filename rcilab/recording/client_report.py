@@ -53,7 +53,9 @@ def report_on_client(run: Run, end: MotionEnd | None = None, name: str = "motion
     late = int(run.cycles["late"].max(initial=0)) if end is None else end.late
     counts = f"{plural(received, 'command')}, {late} late; {plural(missed, 'cycle')} without one"
     line = f"{name}, {run.setup.motion_kind}, {run.duration:.3f} s, {stopped}{nearest}; {counts}"
-    lines = [line, "", *(f"Stopped: {part}" for part in _parts(reason)), ""]
+    lines = [line, ""]
+    if reason:
+        lines += [*(f"Stopped: {part}" for part in _parts(reason)), ""]
     if report is not None:
         lines += [*(f"Note: {note}" for note in report.motion.notes), str(report), ""]
     lines += _describe_commands(run, end, counts)

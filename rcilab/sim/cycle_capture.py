@@ -43,6 +43,7 @@ _NAN = math.nan  # A global name is found faster.
 _RESERVE = 2048  # [rows] That are written before the next look at `has_room`, and those that may still change.
 _FARTHEST = 1024  # [rows] Whose commands may be added; then readers take the row.
 _LONGEST_QUEUE = 256  # Commands that may wait for a row: no queue of the arm is longer.
+_STANDSTILL = 0.02  # [rad/s] Of commanded joints, for a client that ends within a cycle of standstill. A tuning value.
 
 
 _Answer: TypeAlias = tuple[Callable[..., None], int, Callable[[ArmCommand], Any]]
@@ -81,6 +82,7 @@ class CycleCapture:
         "_guests",
         "_has_played",
         "_is_moving",
+        "_last_played",
         "_late",
         "_lost",
         "_lost_client",
@@ -136,6 +138,7 @@ class CycleCapture:
         self._arm, self._playout = controller.arm, controller.arm.playout
         self._lowest = sys.maxsize  # First row with a command of this motion.
         self._has_played = False
+        self._last_played = 0  # Row with the last played command.
         self._guests: set[int] = set()  # Rows with a late command that is not the answer to their state.
         self._taken = 0, -1  # First and last of some rows that all have a command.
         self._offset: int | None = None  # From a number of the client's own counting to its row.
@@ -177,7 +180,7 @@ class CycleCapture:
             missed = self._lost != lost
             if not playback.is_lost and playback.command is not None:
                 played = 1
-                self._has_played = True
+                self._has_played, self._last_played = True, count
                 row = self._commands.pop(id(playback.command), -1)
                 if row < 0:
                     arrival = self._pop_waiting(playback.command)
@@ -335,7 +338,8 @@ class CycleCapture:
 
     def _end_motion(self) -> None:
         controller, playout = self._controller, self._playout
-        reason = controller.reason if controller.faults else Remark(self._lost_client)
+        has_reason = controller.faults or controller.button != "none"
+        reason = controller.reason if has_reason else Remark(self._lost_client) or self._describe_break()
         self._ring.add_event(
             {
                 "event": "end",
@@ -359,6 +363,23 @@ class CycleCapture:
         self._rows.clear()
         self._commands.clear()
         self._waiting.clear()
+
+    def _describe_break(self) -> Remark:
+        """Returns that the client stopped the motion before a last command, while the arm moved; "" if it did not.
+
+        Torques may end at any speed.
+        """
+        is_streamed = self._playout.is_streamed and self._arm.mode.kind is not CommandKind.TORQUES
+        if self._playout.is_finished or not (is_streamed and self._has_played):
+            return Remark("")
+        n, row = self._ring.n, self._last_played % CAPACITY * self._size
+        dq_c = np.frombuffer(self._memory, count=n, offset=row + self._offsets["dq_c"])
+        joint = int(np.abs(dq_c).argmax())
+        speed = abs(float(dq_c[joint]))
+        if speed < _STANDSTILL:
+            return Remark("")
+        sentence = f"the client stopped the motion while joint {joint + 1} moved at {speed:.3g} rad/s"
+        return Remark(sentence, "client_stopped", joint=joint + 1, speed=speed)
 
     def _pack(self, state: RobotState, *playout: int) -> bytes:
         modes = state.faults, state.robot_mode, state.controller_mode, state.motion_generator_mode

@@ -191,7 +191,8 @@ def test_no_curve_of_a_motion_has_a_violation_at_an_end_that_moves(
             programs.torque(robot, 1.0, period=2.0)
         else:
             programs.joint_sine(robot, 0.75, mode=mode, amplitude=0.02, period=1.0)  # It ends in full motion.
-        wait_for(lambda: (actions.tick(), sum(n.text.code == "watch.ended" for n in store.state.notices) > 1)[1])
+        ends = ("watch.ended", "watch.stopped")
+        wait_for(lambda: (actions.tick(), sum(n.text.code in ends for n in store.state.notices) > 1)[1])
     recording = store.state.recording
     assert recording is not None
     run, model = recording.run, store.state.model

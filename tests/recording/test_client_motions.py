@@ -19,6 +19,7 @@ from rcilab.conformance.check import check
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.cycle_ring import CAPACITY, CycleRing, RingCounter
 from rcilab.core.errors import UsageError, VersionMismatchError
+from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.translator import Text
 from rcilab.model.robot_model import load_model
 from rcilab.recording.client_motions import LAG, ClientMotions, MotionPart
@@ -194,6 +195,24 @@ def test_a_motion_that_the_controller_stopped_lasts_until_then() -> None:
     assert run.t[gaps[-1]] - run.begin <= run.duration
     assert f"{run.duration:.3f} s, stopped" in report_on_client(replace(run, stopped="x"), parts[-1].end).line
     assert not any("played them in" in note for note in check_sent(run, distance=None).motion.notes)
+
+
+def test_a_motion_that_its_client_broke_off_did_not_run_to_its_end() -> None:
+    with watched() as (place, motions), place.connect() as robot:
+        robot.set_motor_power(1)
+        state = start_moving(robot)
+        q = np.array(state.q_c[:7])
+        for k in range(200):
+            robot.answer(state, Output(q=(q[0] + 1e-6 * k * k, *q[1:])))
+            state = robot.next_state(state.message_id)
+        robot.stop_move()
+        parts = collect(motions, 1)[0]
+    end = parts[-1].end
+    assert end is not None
+    found = report_on_client(as_run(parts), end)
+    assert re.search(r"stopped: the client stopped the motion while joint 1 moved at 0\.\d+ rad/s", found.line)
+    assert end.stopped is not None
+    assert re.search(r"关节 1 的速度为 \d+\.\d°/s", Text("zh", "rcilab.app").render(describe_note(end.stopped)))
 
 
 def test_a_motion_right_after_another_keeps_its_first_command() -> None:
@@ -571,6 +590,7 @@ def test_the_recorder_writes_a_run_and_a_report_for_every_motion(tmp_path: Path)
     nearest = r"nearest limits: .+ position of joint \d, .+ and .* (velocity|acceleration|jerk) of .+ at \d\.\d{3} s; "
     assert re.search(f"ran to its end; {nearest}", lines[1]), lines[1]
     report = second.with_suffix(".txt").read_text()
+    assert "\n\n\n" not in report
     assert "cartesian.velocity.translation" in report
     assert "Settings in force" in report
     assert str(first) in lines[0]
