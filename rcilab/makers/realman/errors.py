@@ -117,6 +117,18 @@ JOINT_BITS = frozenset(
 )
 """The errors of a single joint."""
 
+REFUSED_COMMANDS = frozenset(
+    {
+        RealManError.TARGET_OVER_LIMIT,
+        RealManError.UNREACHABLE,
+        RealManError.NO_WORK_FRAME,
+        RealManError.NO_TOOL_FRAME,
+        RealManError.JOINT_DISABLED,
+        RealManError.CIRCLE,
+    }
+)
+"""The errors of refused commands, each reported until the next command that is accepted."""
+
 _CLEAR_JOINT = "clear the error with set_joint_clear_err, then enable the joint"
 
 _CAUSES = {

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
@@ -30,7 +29,7 @@ from rcilab.makers.realman.controller.programs import Program, RunningProgram
 from rcilab.makers.realman.controller.reporter import report_state
 from rcilab.makers.realman.controller.settings import SIGNALS, Settings, ToolFrame
 from rcilab.makers.realman.controller.trajectories import Trajectory, TrajectoryQueue
-from rcilab.makers.realman.errors import JOINT_BITS, RealManError
+from rcilab.makers.realman.errors import JOINT_BITS, REFUSED_COMMANDS, RealManError
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.api import SafetyButton
@@ -40,17 +39,6 @@ from rcilab.sim.self_collision import SelfCollisionWatch
 from rcilab.sim.violations import describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 
-_TRANSIENT: Final = frozenset(
-    {
-        RealManError.TARGET_OVER_LIMIT,
-        RealManError.UNREACHABLE,
-        RealManError.NO_WORK_FRAME,
-        RealManError.NO_TOOL_FRAME,
-        RealManError.JOINT_DISABLED,
-        RealManError.CIRCLE,
-    }
-)
-"""Errors that do not refuse the next motion."""
 _ESTOP = Remark("the emergency stop was pressed", "estop")
 
 
@@ -158,7 +146,7 @@ class RealManController:
     def phase_name(self) -> str:
         """What it does: "idle", "moving", "paused" or "fault"."""
         if any(word & ~RealManError.JOINT_POSITION_STEP.code for word in self.joint_errors) or any(
-            error not in _TRANSIENT for error in self.system_errors
+            error not in REFUSED_COMMANDS for error in self.system_errors
         ):
             return "fault"
         state = self.drive.planner.state
@@ -170,7 +158,7 @@ class RealManController:
         if not (self.system_errors or any(self.joint_errors)):
             return ()
         bits = [error for error in JOINT_BITS if any(word & error.code == error.code for word in self.joint_errors)]
-        return (*(error for error in self.system_errors if error not in _TRANSIENT), *sorted(bits))
+        return (*(error for error in self.system_errors if error not in REFUSED_COMMANDS), *sorted(bits))
 
     @property
     def safety_box(self) -> SafetyBox | None:
@@ -341,7 +329,7 @@ class RealManController:
         Raises:
             InvalidValueError: A joint is disabled or has an error, an error is set, or the emergency stop is pressed.
         """
-        lasting = [error for error in self.system_errors if error not in _TRANSIENT]
+        lasting = [error for error in self.system_errors if error not in REFUSED_COMMANDS]
         if self.is_dragging:
             raise InvalidValueError("motion", "", "is not possible: drag teaching is on; stop_drag_teach ends it")
         if self.button != "none":
@@ -358,7 +346,7 @@ class RealManController:
     def begin_command(self) -> None:
         """Prepares for a motion command: the errors of refused ones are gone."""
         self.require_ready()
-        self.system_errors = tuple(error for error in self.system_errors if error not in _TRANSIENT)
+        self.system_errors = tuple(error for error in self.system_errors if error not in REFUSED_COMMANDS)
         if self._needs_configuration and self.drive.is_still and not self.drive.is_stopping:
             self._configure()
 

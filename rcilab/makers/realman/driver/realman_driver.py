@@ -25,6 +25,7 @@ from rcilab.makers.realman.driver.handshake import find_arm
 from rcilab.makers.realman.driver.push_receiver import NumberedPush, PushReceiver
 from rcilab.makers.realman.driver.session_commands import RealManSessionCommands
 from rcilab.makers.realman.driver.settings import RealManSettings
+from rcilab.makers.realman.errors import REFUSED_COMMANDS
 from rcilab.makers.realman.wire.units import degrees_for_client
 from rcilab.robots import describe_robot
 
@@ -196,13 +197,16 @@ class RealManDriver(LibraryDriver[NumberedPush]):
         if mode is not ControllerMode.JOINT_POSITION:
             raise InvalidValueError("mode", mode, "is not a mode to move in; there is JOINT_POSITION")
         self._settings.await_states()
-        latest = self._link.latest
+        link, latest = self._link, self._link.latest
         assert latest is not None  # A connection begins with a state.
-        if not self._link.is_enabled and not latest.faults and latest.robot_mode is not RobotMode.USER_STOPPED:
+        if latest.faults and REFUSED_COMMANDS.issuperset(latest.faults):  # Of a command before this motion.
+            link.ask(link.client.request, link.client.api.rm_clear_system_err)
+            link.wait(lambda: link.latest is not None and not link.latest.faults, _RECOVERED)
+        if not link.is_enabled and not latest.faults and latest.robot_mode is not RobotMode.USER_STOPPED:
             raise CommandRejectedError(
                 "the motion", "joints are disabled", "power_on() enables all joints", reason="power_off"
             )
-        self._link.is_streaming = True
+        link.is_streaming = True
 
     def has_begun(self, state: RobotState) -> bool:
         """Returns whether a state shows that targets are followed."""

@@ -70,6 +70,15 @@ def test_a_callback_begins_at_the_arm_and_there_is_one_mode(robot):
         robot.control(lambda state, t: JointPosition(state.q_c), "torque")
 
 
+def test_the_error_of_a_refused_command_does_not_stop_the_next_motion(robot):
+    with pytest.raises(CommandRejectedError):
+        robot.realman.move_j([0.0, 30.0, 0.0, 60.0, 0.0, 90.0], 0.5)  # Degrees.
+    robot.receive_states(3)
+    assert robot.state.faults == (RealManError.TARGET_OVER_LIMIT,)
+    run = robot.execute(plan_joint(robot.model, robot.state.q_c, HOME + 0.1 * OFF, speed=0.4))
+    assert (run.faults, robot.state.faults) == ((), ())
+
+
 def test_an_error_ends_a_motion_with_its_name_and_recover_clears_it(robot):
     far = HOME + 3.0 * np.eye(6)[0]
     with pytest.raises(ControlError, match=r"0x4000 joint position step \(the commands of a joint jump\)") as caught:
