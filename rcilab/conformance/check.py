@@ -33,6 +33,7 @@ from rcilab.motion.bounds import RECOVERY_RANGE, range_from
 from rcilab.motion.motion import Motion, require_motion
 
 _NEAR = 0.2  # Of the worst value: a smooth signal comes so near in the cycle before it or after; a tuning value.
+_STANDS = 1e-6  # [rad] Of joints that only keep a pose which does not change; far below what moves a tool.
 
 
 def check(
@@ -225,7 +226,7 @@ def _report(
     found = sorted((v for _, violations in results for v in violations), key=lambda v: -v.ratio)
     facts = {"model": model.name, "law": motion.law, "duration": f"{motion.duration:.3f}", "speed": f"{motion.speed:g}"}
     return Report(
-        title=_title(model, mode, facts, _distance_between(followed, motion)),
+        title=_title(model, mode, facts, followed, motion),
         rows=tuple(result for result, _ in results),
         violations=tuple(v for v in found if v.condition.necessity == "necessary"),
         warnings=tuple(v for v in found if v.condition.necessity == "recommended"),
@@ -246,9 +247,11 @@ def _distance_between(followed: Motion, motion: Motion) -> float:
     return 0.0 if followed is motion else float(np.abs(followed.q - motion.q[: len(followed)]).max())
 
 
-def _title(model: RobotModel, mode: Mode, facts: dict[str, str], away: float) -> Phrase:
+def _title(model: RobotModel, mode: Mode, facts: dict[str, str], followed: Motion, motion: Motion) -> Phrase:
+    away = _distance_between(followed, motion)
     if away:
-        return Phrase("title.free_elbow", **facts, mode=mode, away=away)
+        stands = len(followed) == len(motion) and np.abs(followed.q - followed.start).max() < _STANDS
+        return Phrase("title.elbow_only" if stands else "title.free_elbow", **facts, mode=mode, away=away)
     if mode != "joint_position":
         return Phrase("title.in_mode", **facts, mode=mode)
     table = model.description.conditions

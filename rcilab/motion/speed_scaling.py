@@ -83,7 +83,7 @@ class SpeedScaledMotion:
         if not self.changed:
             return self.motion
         if len(self.q) == 1:
-            return stationary_motion(self.q[0], law="samples")
+            return stationary_motion(self.q[0], law="samples", speed=self.motion.speed)
         rate, drate = self.rate[:, np.newaxis], self.drate[:, np.newaxis]
         slope, bend = (self.motion.polynomial.sample(self.plan_time, order) for order in (1, 2))
         v, a = slope * rate, bend * rate**2 + slope * drate
@@ -92,7 +92,8 @@ class SpeedScaledMotion:
         parts = quintic((self.q[:-1], v[:-1], a[:-1]), (self.q[1:], v[1:], a[1:]), h)
         pieces = np.stack([part / h**power for power, part in enumerate(parts)], axis=2)
         breaks = h * np.arange(len(self.q), dtype=np.float64)
-        return Motion(polynomial=PiecewisePolynomial(breaks, pieces), goal=self.q[-1], law="samples")
+        curve = PiecewisePolynomial(breaks, pieces)
+        return Motion(polynomial=curve, goal=self.q[-1], law="samples", speed=self.motion.speed)
 
 
 def as_planned(motion: Motion) -> SpeedScaledMotion:

@@ -18,6 +18,7 @@ from rcilab.core.cycle_log import state_cycles
 from rcilab.core.errors import SAFETY_STOP, ControlError, UsageError, plain_text
 from rcilab.core.fault import FaultCode, name_faults
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
+from rcilab.core.state import require_mode
 from rcilab.i18n.notebook_language import language
 from rcilab.i18n.translator import Remark
 from rcilab.i18n.units import USUAL, Units
@@ -280,10 +281,13 @@ class Run:
 
     @property
     def report(self) -> Report | None:
-        """Check of the plan; None without a plan or an arm. Computed at each access, with the current conditions."""
+        """Check of the plan in the mode of the run; None without a plan or an arm.
+
+        Computed at each access, with the current conditions.
+        """
         if self.plan is None or self.model is None:
             return None
-        return check(self.plan, self.model)
+        return check(self.plan, self.model, mode=require_mode(self.setup.mode or "joint_position"))
 
     def commanded(self) -> Motion:
         """Returns the motion that the controller reports as commanded, on the 1 ms grid, without the play-out delay.
@@ -429,7 +433,7 @@ class Run:
         if self.missed_goal is not None:
             joint, angle = self.missed_goal
             facts.append(f"ended {angle:.2g} rad ({math.degrees(angle):.2g} deg) from its goal at joint {joint}")
-        if self.stopped:
+        if self.stopped and not self.faults:
             facts.append(f"stopped: {plain_text(self.stopped)}")
         if not self.is_complete:
             facts.append(f"cut off: {self.missing_end}")

@@ -12,7 +12,7 @@ from rcilab.conformance.signals import HOLD_SAMPLES
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition
 from rcilab.model.robot_model import RobotModel, load_model
-from rcilab.motion import Motion, plan_joint
+from rcilab.motion import Motion, plan_joint, plan_nullspace
 
 OFF = np.array([0.3, 0.2, -0.2, 0.3, 0.2, 0.1, 0.4])
 
@@ -54,6 +54,15 @@ def test_the_report_has_the_joint_angles_that_will_be() -> None:
     away = np.degrees(np.abs(followed.q - motion.q).max())
     assert report.title.endswith(f"up to {away:.2f}° from the plan")
     assert "与规划最多相差" in report.title.text("zh")
+
+
+def test_a_motion_of_the_elbow_alone_is_reported_to_move_nothing() -> None:
+    model = load_model("FR3")
+    motion = plan_nullspace(model, model.home, psi=0.4)
+    title = check(motion, model, mode="cartesian_position").title
+    assert "nothing else moves: the arm will stand still" in title
+    assert "机械臂将保持不动" in title.text("zh")
+    assert "stand still" not in check(plan(model), model, mode="cartesian_position").title
 
 
 def test_a_joint_that_only_the_controller_moves_out_of_its_range_is_found() -> None:

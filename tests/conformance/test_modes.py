@@ -310,6 +310,15 @@ def test_a_spoiled_torque_is_flagged_in_exactly_its_two_differences(name, seed, 
     assert found == [(cycle, "torque.rate", joint + 1, fault) for cycle in (place, place + 1)]
 
 
+def test_a_plan_that_is_too_fast_for_torques_is_to_be_slower_for_nothing_was_measured():
+    model = load_model("FR3")
+    u = np.linspace(0.0, 1.0, 1001)[:, np.newaxis]
+    way = np.eye(7)[0] * 2.4 * u**3 * (10.0 - 15.0 * u + 6.0 * u * u)  # Joint 1 reaches 4.5 rad/s.
+    (violation,) = check(Motion.from_cycles(model.home + way), model, mode="torque").violations
+    assert violation.condition.id == "measured.joint.velocity"
+    assert "times slower" in str(violation)
+
+
 def test_torques_are_necessary_in_torque_mode_and_recommended_for_positions():
     motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.3, speed=0.5)
     told, moved = check(motion, MODEL, mode="torque"), check(motion, MODEL)

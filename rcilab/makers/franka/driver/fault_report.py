@@ -72,12 +72,12 @@ def describe_faults(
     table = model.description.conditions
     assert table is not None  # Every Franka arm has one.
     conditions = CommandConditions.of(table())
-    commanded, _ = find_commanded(faults, record, limits, conditions)
+    commanded, is_violated = find_commanded(faults, record, limits, conditions)
     followed = find_followed(faults, record, model, limits, conditions)
     lost = find_lost_commands(record) if FrankaError.COMMUNICATION_CONSTRAINTS_VIOLATION in faults else ""
     found = [part for part in (commanded, followed, lost, _describe_reflex(faults, record)) if part]
     advice = late or next((_ADVICE[fault] for fault in faults if fault in _ADVICE), "")
-    advice = advice or (_OF_JOINTS if followed else _SMOOTHNESS)
+    advice = advice or (_OF_JOINTS if followed and not is_violated else _SMOOTHNESS)
     parts = [f"the controller stopped the motion {when}: {names}", *found, advice]
     finding = Remark.all(part for part in found if isinstance(part, Remark))
     return FaultReport("; ".join(parts), f"recover() clears the fault; {_HELD}", finding)

@@ -76,7 +76,8 @@ def describe_faults(
     found = [part for part in (commanded, followed, *measured, passed) if part]
     parts += found
     if faults:
-        parts.append(late or (_OF_JOINTS if followed else _remedy(faults[0], mode, is_violated=is_violated)))
+        is_of_joints = followed and not is_violated
+        parts.append(late or (_OF_JOINTS if is_of_joints else _remedy(faults[0], mode, is_violated=is_violated)))
     advice = _HELD if (RANGE_FAULTS | BOX_FAULTS) & set(faults) else f"recover() clears the fault; {_HELD}"
     finding = Remark.all(part for part in found if isinstance(part, Remark))
     return FaultReport("; ".join(parts), advice, finding)

@@ -109,6 +109,7 @@ def test_the_plan_of_poses_has_the_joint_angles_that_the_arm_follows(robot):
     assert ("sent without the arm angle" in report.title) is is_free
     assert bool(np.abs(robot.state.q_c - motion.goal).max() > 0.1) is is_free
     assert run.plan.goal == pytest.approx(robot.state.q_c, abs=1e-6)
+    assert "in mode cartesian_position" in run.report.title
 
 
 def test_the_speed_of_poses_is_changed_on_the_way(robot):
@@ -123,6 +124,7 @@ def test_the_speed_of_poses_is_changed_on_the_way(robot):
     run = robot.execute(motion, progress=progress, mode="cartesian_position", speed_override=0.8)
     changed[0].join()
     assert run.duration > 1.2 * motion.duration
+    assert run.plan.speed == motion.speed
     assert np.abs(run.error).max() <= 1e-5  # The rows between those of the plan are interpolated.
 
 
@@ -276,6 +278,8 @@ def test_a_pose_that_is_too_far_is_found(robot):
     with pytest.raises(ControlError, match=r"tool: commanded.*translation") as caught:
         robot.control(leap, "cartesian_position")
     assert FrankaError.CARTESIAN_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION in caught.value.faults
+    assert "poses inside the tool's limits" not in str(caught.value)
+    assert repr(caught.value.run).count("cartesian_motion_generator_velocity_limits_violation") == 1
 
 
 def test_a_joint_that_poses_make_too_fast_is_found(robot):
