@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import sqrt
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from rcilab.core.errors import PlanningError
 from rcilab.core.limits import JointLimits
 from rcilab.motion import _ruckig
 from rcilab.motion.piecewise import PiecewisePolynomial
+from rcilab.sim.planner.braking import stop_distance
 from rcilab.sim.planner.mover import MotionState
 from rcilab.sim.planner.section_bounds import joint_bounds
 from rcilab.sim.planner.stream_filter import StreamFilter, StreamMode
@@ -21,6 +23,7 @@ _THERE = 1e-7  # [rad] ruckig reaches a goal within 1e-8.
 _NEAR = 1e-6  # [rad] From the streamed angles: beyond it the joints catch up with them.
 _ROUNDING = 1e-12  # [rad], [rad/s].
 _LEAST_SPEED = 0.01  # Of the largest one, by which a joint at that speed still catches up; a tuning value.
+_CATCH_UP = 0.1  # Of their velocity, by which a joint catches up with smoothed angles that may stop; a tuning value.
 _STOP_ROOM = 2.0  # By which a stop with small jerk is longer than one with constant deceleration; a tuning value.
 _FASTEST = JointSpeed()
 _SLOW = 2e-4  # [rad/s] Relative to angles that move: a slower joint that is near follows them.
@@ -196,11 +199,14 @@ class StreamMover:
         q = self._filter.step()
         if self._filter.mode == "linear":
             if not self._stays_on_line(q, self._filter.velocity):
-                self._step_along(q, self._velocities_through(q))
+                self._step_along(q, self._velocities_through(q), self._velocity)
         elif self._filter.mode == "direct":
             self._axes.step_to_positions(q, self._velocity)
-        elif self._is_off or not self._takes(q):
-            self._chase(q)
+        else:
+            before = self.state
+            if self._is_off or not self._takes(q):
+                self._chase(q)
+            self._keep_inside(before, q)
         now = list(self._axes.q)
         self._past, self._before = [now, *self._past[:2]], q
         return now
@@ -208,8 +214,14 @@ class StreamMover:
     def _chase(self, q: Sequence[float]) -> None:
         """Catches up with smoothed angles, until the joints are at them and move as they do."""
         dq = [(x - x1) / CYCLE_TIME for x, x1 in zip(q, self._before, strict=True)]
-        self._step_along(q, dq)
         axes = self._axes
+        bounds = [
+            v_max
+            if v * (goal - x) <= 0.0
+            else min(v_max, max((1.0 + _CATCH_UP) * abs(v), sqrt(2.0 * a_max * abs(goal - x))))
+            for x, goal, v, v_max, a_max in zip(axes.q, q, dq, self._velocity, self._bounds[0], strict=True)
+        ]
+        self._step_along(q, dq, bounds)
         self._is_off = any(abs(x - x1) > _NEAR for x, x1 in zip(axes.q, q, strict=True)) or any(
             abs(v - v1) > _SLOW for v, v1 in zip(axes.dq, dq, strict=True)
         )
@@ -227,17 +239,48 @@ class StreamMover:
         axes.set_state(q, [v + 0.5 * h * a for v, a in zip(dq, ddq, strict=True)], ddq)
         return True
 
-    def _step_along(self, q: Sequence[float], dq: Sequence[float]) -> None:
-        """Advances to angles that themselves move with these velocities, and catches up with them.
+    def _keep_inside(self, before: MotionState, q: Sequence[float]) -> None:
+        """Lets a joint that could no longer stop inside its range move to the angle as to a standing one instead.
+
+        Args:
+            before: The state at the start of this cycle.
+            q: The angles to follow.
+        """
+        axes, limits = self._axes, self._limits
+        after = self.state
+        stops = [
+            low <= x - stop_distance(-v, -a, a_max, j_max) and x + stop_distance(v, a, a_max, j_max) <= high
+            for x, v, a, a_max, j_max, low, high in zip(
+                *after, *self._bounds, limits.lower.tolist(), limits.upper.tolist(), strict=True
+            )
+        ]
+        if all(stops):
+            return
+        axes.set_state(*before)
+        axes.step_to_positions(q, self._velocity)
+        mixed = [
+            [new if is_kept else old for is_kept, new, old in zip(stops, kept, braked, strict=True)]
+            for kept, braked in zip(after, self.state, strict=True)
+        ]
+        axes.set_state(*mixed)
+        self._is_off = True
+
+    def _step_along(self, q: Sequence[float], dq: Sequence[float], velocity: Sequence[float]) -> None:
+        """Advances to angles that themselves move, and catches up with them.
 
         In axes that move along, they are a standing target.
+
+        Args:
+            q: The angles.
+            dq: Their velocities.
+            velocity: The largest ones of the joints.
         """
         axes, h = self._axes, CYCLE_TIME
         behind = [_without_rounding(x - (goal - h * v)) for x, goal, v in zip(axes.q, q, dq, strict=True)]
         slower = [_without_rounding(x - v) for x, v in zip(axes.dq, dq, strict=True)]
         bounds = [
             max(v_max - v if x < 0.0 else v_max + v, _LEAST_SPEED * v_max)
-            for x, v, v_max in zip(behind, dq, self._velocity, strict=True)
+            for x, v, v_max in zip(behind, dq, velocity, strict=True)
         ]
         axes.set_state(behind, slower, axes.ddq)
         axes.step_to_positions([0.0] * len(q), bounds)

@@ -121,3 +121,24 @@ def test_targets_that_come_late_and_together_are_not_jumped_to(is_kept, fastest)
             smoothing.take([target])
         q.append(smoothing.step()[0])
     assert np.diff(q)[50:].max() < fastest  # [rad] In a cycle; the targets move 1e-3 rad.
+
+
+@pytest.mark.parametrize("mode", ["fit", "filter"])
+@pytest.mark.parametrize(("first", "last", "overshoot"), [(160.0, 177.9, 0.1), (0.0, 30.0, 4.0)])
+def test_a_stream_that_ends_abruptly_does_not_leave_the_range_and_is_hardly_passed(
+    mode: StreamMode, first: float, last: float, overshoot: float
+):
+    """Its angles move at once with 50 or 100 deg/s; the range ends at 178 deg."""
+    model = load_model("RM75")
+    stream = np.arange(first, last, 0.25 if first else 0.5).tolist()
+    q = model.home.copy()
+    q[0] = np.radians(first)
+    planner = Planner(model, model.limits, q.tolist())
+
+    def send(planner: Planner, angle: float) -> None:
+        assert planner.follow_joints([float(np.radians(angle)), *q[1:].tolist()], mode=mode) is None
+
+    actions = {5 * k: lambda planner, x=x: send(planner, x) for k, x in enumerate([*stream, last])}
+    rows, _ = drive(planner, actions)
+    assert np.degrees(rows[:, 0].max()) < last + overshoot + 1e-3
+    assert np.degrees(rows[-1, 0]) == pytest.approx(last, abs=1e-4)
