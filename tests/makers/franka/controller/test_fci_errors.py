@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from rcilab.app.text import Text
-from rcilab.conformance.check import check
+from rcilab.conformance.check import check, check_commands
+from rcilab.conformance.signals import Record
 from rcilab.i18n.error_messages import describe_note
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion
@@ -59,9 +60,15 @@ def require_chinese(place: FciArena) -> None:
 
 
 def judged_before(robot: Robot, rows: np.ndarray, *, is_cartesian: bool) -> tuple[int, set[str]]:
-    """Returns the first cycle in which `rcilab.check` finds a motion wrong, and the errors of that cycle."""
-    mode = "cartesian_position" if is_cartesian else "joint_position"
-    report = check(Motion.from_cycles(rows), load_model(MODELS[robot.version]), mode=mode, distance=None)
+    """Returns the first cycle in which the check finds a motion wrong, and the errors of that cycle.
+
+    These poses are sent with the elbow; `check` itself leaves that of an FR3 free, as pylibfranka does.
+    """
+    motion, model = Motion.from_cycles(rows), load_model(MODELS[robot.version])
+    if is_cartesian:
+        report = check_commands(motion, model, Record(is_to_come=True), distance=None, mode="cartesian_position")
+    else:
+        report = check(motion, model, distance=None)
     necessary = [violation for violation in report.violations if violation.fault is not None]
     first = min(round(violation.time / 0.001) for violation in necessary)
     return first, {v.fault.manual_name for v in necessary if round(v.time / 0.001) == first and v.fault is not None}
