@@ -9,6 +9,8 @@ from __future__ import annotations
 import time
 from typing import NamedTuple
 
+import numpy as np
+
 from rcilab.core.fault import FaultCode
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.core.state import RobotMode, RobotState
@@ -44,6 +46,7 @@ class XArmConnection(LibraryConnection[bytes]):
         client: The client library.
         shown: What the controller is doing.
         error: Number of the error that is set; 0: none.
+        is_still: Whether the arm is commanded the same joint angles in the newest two states.
 
     Args:
         client: As the attribute.
@@ -56,6 +59,7 @@ class XArmConnection(LibraryConnection[bytes]):
         self.client = client
         self.shown = Shown(0, 0, 0)
         self.error = 0
+        self.is_still = False
         self._error_ns = 0
         self._reader = StateReader(n)
         self._user_frame: tuple[tuple[float, ...], Pose] = (), IDENTITY
@@ -83,7 +87,9 @@ class XArmConnection(LibraryConnection[bytes]):
         self._update_error(before)
         self._reader.T_base_user = self.T_base_user
         faults = faults_of(self.error)
-        return self._reader.read(report, faults, self._fault_mode(faults), is_streaming=self.is_streaming)
+        state = self._reader.read(report, faults, self._fault_mode(faults), is_streaming=self.is_streaming)
+        self.is_still = self.latest is not None and np.array_equal(state.q_c, self.latest.q_c)
+        return state
 
     def _update_error(self, before: Shown) -> None:
         slow = self.client.slow

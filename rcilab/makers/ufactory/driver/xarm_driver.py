@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 _SWITCHED = 2.0  # [s] For the motors to show that they are on or off; brakes take 0.2 s.
 _RECOVERED = 3.0  # [s] For an error to be gone after the controller has accepted `clean_error`.
+_ARRIVED = 1.0  # [s] For the arm to stand after the last target.
 _REACTION = 1.0  # [s] For a report that shows a new mode.
 
 
@@ -203,10 +204,11 @@ class XArmDriver(LibraryDriver[bytes]):
         self._settings.servo(command.q)
 
     def end(self, timeout: float | None = None) -> None:
-        """Leaves mode 1; an arm that is stopped stays so."""
+        """Leaves mode 1 once the arm stands at the last target; an arm that is stopped stays so."""
         link, client = self._link, self._link.client
         link.is_streaming = False
         client.hurry(False)
+        link.wait(lambda: link.is_still or link.shown.state not in (MOVING, READY), _ARRIVED)
         is_ready = link.shown.state in (MOVING, READY)
         link.ask(client.request, "set_mode", client.api.set_mode, READY_MODE)
         if is_ready:
