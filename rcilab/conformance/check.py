@@ -24,7 +24,7 @@ from rcilab.core.arrays import Array, Unquoted, as_rows, described
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Bounds, Condition
-from rcilab.core.errors import InvalidValueError, UsageError
+from rcilab.core.errors import InvalidValueError, ModelError, UsageError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.state import Mode, require_mode
@@ -79,6 +79,7 @@ def check(
     Raises:
         InvalidValueError: The motion has another number of joints, or the start, the mode or another argument is not
             valid for this arm.
+        ModelError: The arm's controller has no such mode.
     """
     return _check(motion, model, start, box, distance, mode)
 
@@ -179,7 +180,12 @@ def _check(
         )
     state = as_start(motion.start if start is None else start, model.n)
     mode = require_mode(mode)
-    rows = condition_table(model.description).rows(mode, has_elbow=bool(model.redundancy), has_box=box is not None)
+    table = condition_table(model.description)
+    if mode not in table.modes:
+        raise ModelError(f"the controller of {model.name} has no {mode.replace('_', ' ')} mode").coded(
+            "no_feature", model=model.name, feature=mode
+        )
+    rows = table.rows(mode, has_elbow=bool(model.redundancy), has_box=box is not None)
     if distance is not None:
         rows = (*rows, *clearance_conditions(distance))
     if record is not None:

@@ -12,9 +12,9 @@ from rcilab.execution.connect import open_session
 from rcilab.execution.session import RobotSession
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
-from rcilab.makers.maker import find_missing_feature, require_simulator
+from rcilab.makers.maker import capabilities_of, find_missing_feature, require_simulator
 from rcilab.model.robot_model import RobotModel, load_model, require_model
-from rcilab.sim.controller_config import ControllerConfig, require_plant
+from rcilab.sim.controller_config import ControllerConfig, require_option, require_plant
 from rcilab.sim.streamed_motion import require_loss_behaviour
 
 ANSWER_TIMEOUT = 10.0  # [s] The controller is on this machine: if it is slow, the machine is busy.
@@ -25,7 +25,7 @@ def simulate(
     model: RobotModel,
     *,
     plant: str = "ideal",
-    lockstep: bool = True,
+    lockstep: bool | None = None,
     record_all: bool = False,
     realism: str = "off",
     on_loss: str | None = None,
@@ -37,7 +37,8 @@ def simulate(
         model: The arm, with its tool, load and soft limits; the virtual controller receives all three.
         plant: "ideal" (the arm follows the command exactly) or "mujoco".
         lockstep: True: each simulated millisecond waits for its command, so that a run has the same result to the last
-            bit on any machine. False: the controller runs freely at 1 kHz, like a real one.
+            bit on any machine. False: the controller runs freely, like a real one. None: True where the interface can,
+            that of ROKAE and Franka.
         record_all: Whether runs store every field of the state, three times as much; see `Run.cycles`.
         realism: "real": the joints of the MuJoCo plant have the friction and torque sensors of real ones; or "off".
         on_loss: What the arm does while commands are missing: "hold" the last one, or "bridge" the gap; None: as the
@@ -45,7 +46,7 @@ def simulate(
         prefill: Cycles by which commands are played later; None: none in lock-step, else 10; torques 2 in both.
 
     Raises:
-        InvalidValueError: `model` is not a robot model, or another value is unknown.
+        InvalidValueError: `model` is not a robot model, or another value is unknown, or the arm has no lock-step.
         ModelError: The arm has no virtual controller.
         ConnectionLostError: The virtual controller did not start; the message contains its output.
     """
@@ -55,6 +56,10 @@ def simulate(
             "maker's client library"
         ).coded("no_driver", model=model.name)
     require_plant(plant, realism)
+    capable = capabilities_of(model).options
+    if lockstep:
+        require_option("lockstep", lockstep, capable, model.name)
+    lockstep = "lockstep" in capable if lockstep is None else lockstep
     options = ["--realism", realism]
     if on_loss is not None:
         options += ["--on-loss", require_loss_behaviour(on_loss)]

@@ -12,7 +12,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.fault import FaultCode
 from rcilab.core.limits import JointLimits, Limits
-from rcilab.core.state import Mode
+from rcilab.core.state import MODES, Mode
 
 Necessity: TypeAlias = Literal["necessary", "recommended"]
 Stage: TypeAlias = Literal["throughout", "start", "end"]
@@ -172,6 +172,8 @@ class ConditionTable:
     """Every condition of the interface."""
     command_cycles: int = 1
     """Cycles from one command of a motion to the next: of its rows, only every so many are sent."""
+    modes: tuple[Mode, ...] = MODES
+    """Modes in which it has conditions; `check` refuses others."""
     has_free_elbow: bool = False
     """Whether poses without an arm angle leave it free: the joints move least. Otherwise the arm angle is held."""
     sends_arm_angle: bool = True

@@ -24,7 +24,7 @@ ForceSign: TypeAlias = Literal["on-arm", "by-arm"]
 """Sign of reported external forces: exerted by the environment on the arm, or by the arm on the environment."""
 FORCE_SIGNS: tuple[ForceSign, ...] = get_args(ForceSign)
 
-ControllerOption: TypeAlias = Literal["auto_limit", "loop_back", "on_loss", "force_sign", "mode_delay"]
+ControllerOption: TypeAlias = Literal["auto_limit", "loop_back", "on_loss", "force_sign", "mode_delay", "lockstep"]
 """Options that the controllers of some makers lack."""
 CONTROLLER_OPTIONS: tuple[ControllerOption, ...] = get_args(ControllerOption)
 

@@ -22,7 +22,7 @@ from rcilab.conformance.start import StartState
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
-from rcilab.core.errors import CertificateError, InvalidValueError, PlanningError
+from rcilab.core.errors import CertificateError, InvalidValueError, ModelError, PlanningError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import MODES, Mode
@@ -150,10 +150,10 @@ def require_same(model: RobotModel, mode: Mode, rows: Array, start: StartState |
 
 
 def require_mode_of(name: str, mode: Mode) -> RobotModel:
-    """Returns an arm; skips a test of torques for one that takes none."""
+    """Returns an arm; skips a mode for which its interface has no conditions."""
     model = MODELS[name]
-    if not condition_table(model.description).rows(mode, has_elbow=False):
-        pytest.skip("the interface takes no torques")
+    if mode not in condition_table(model.description).modes:
+        pytest.skip("the interface has no such mode")
     return model
 
 
@@ -405,8 +405,7 @@ def test_planned_paths_keep_the_tools_limits(name, seed, kind):
         return
     report = check(motion, model, distance=None, mode="cartesian_position")
     assert {v.condition.id for v in report.violations} <= {"cartesian.frame"}, report
-    singular = check(motion, model, distance=None, mode="cartesian_impedance").rows[0]
-    assert report.ok == singular.ok
+    assert report.ok == report.rows[0].ok
 
 
 def test_a_six_axis_arm_has_no_rows_on_an_arm_angle():
@@ -495,3 +494,11 @@ def test_rest_is_asked_for_at_both_ends_and_nowhere_else(name, mode):
         assert {b.condition.stage for b in found} - {"throughout"} == wanted
         report = check(Motion.from_cycles(rows), model, distance=None, mode=mode)
         assert {v.condition.stage for v in report.warnings} - {"throughout"} == wanted
+
+
+@pytest.mark.parametrize("name", ["RM75", "xArm6"])
+def test_a_mode_that_the_controller_has_not_is_refused(name):
+    model = load_model(name)
+    motion = plan_joint(model, model.home, model.home + 0.05, speed=0.3)
+    with pytest.raises(ModelError, match=f"the controller of {name} has no torque mode"):
+        check(motion, model, mode="torque")

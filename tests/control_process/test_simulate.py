@@ -249,6 +249,13 @@ def test_a_simulated_arm_can_have_real_joints_and_bridge_pauses(monkeypatch):
     assert started == [("xMatePro7", "mujoco", True, ["--realism", "real", "--on-loss", "bridge"])]
 
 
+@pytest.mark.parametrize("name", ["RM75", "xArm6"])
+def test_an_arm_without_lock_step_refuses_it_before_anything_starts(name, monkeypatch):
+    monkeypatch.setattr("rcilab.control_process.simulate.start_controller", None)
+    with pytest.raises(InvalidValueError, match=f"lockstep: True cannot be set: the controller of {name} has no such"):
+        simulate(load_model(name), lockstep=True)
+
+
 def test_closing_ends_the_private_controller():
     robot = simulate(MODEL)
     address = robot.address

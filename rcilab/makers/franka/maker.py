@@ -37,6 +37,7 @@ class Franka:
         drives=True,
         streams=True,
         modes=MODES,
+        options=("lockstep",),
         setup=("tool", "load", "control"),
         longest_tool=LONGEST_TOOL,
     )

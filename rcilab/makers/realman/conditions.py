@@ -127,6 +127,7 @@ REALMAN_CONDITIONS = ConditionTable(
     torque=_TORQUES,
     measured=_MEASURED,
     box=_BOX,
+    modes=("joint_position", "cartesian_position"),
     conditions=(*_MOTION, _STEP, _FENCE, _BOX, *_TOOL, *_TORQUES, *_MEASURED, _CONTACT, _LINKS),
 )
 """The rows for `check` and the monitors."""

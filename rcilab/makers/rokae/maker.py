@@ -44,7 +44,7 @@ class Rokae:
         outputs=tuple(f"DO{name}" for name in SIGNAL_NAMES),
         inputs=tuple(f"DI{name}" for name in SIGNAL_NAMES),
         setup=("box", "tool", "load", "force", "joints", "control"),
-        options=("auto_limit", "loop_back", "on_loss", "force_sign", "mode_delay"),
+        options=("auto_limit", "loop_back", "on_loss", "force_sign", "mode_delay", "lockstep"),
         longest_tool=LONGEST_TOOL,
     )
     timing = Timing()
