@@ -71,6 +71,11 @@ class Plan:
         return self.motion if self.planned is None else self.planned
 
     @property
+    def away(self) -> float:
+        """Largest distance at the end of the joints from where they were planned, [rad]; 0 as planned."""
+        return 0.0 if self.planned is None else float(np.abs(self.motion.goal - self.planned.goal).max())
+
+    @property
     def starts_at(self) -> JointVector:
         """Joint angles at which it must be executed, [rad]."""
         return self.motion.start

@@ -15,7 +15,7 @@ from rcilab.motion.motion import Motion
 _SAME = 1e-9  # [rad] To which the inverse of its own result comes.
 
 
-def leaves_elbow_free(model: RobotModel, mode: Mode) -> bool:
+def leaves_elbow_free(model: RobotModel, mode: Mode | str) -> bool:
     """Returns whether a motion in a mode is sent as poses without the arm angle, which the controller leaves free."""
     table = condition_table(model.description)
     is_free = table.has_free_elbow and not table.sends_arm_angle

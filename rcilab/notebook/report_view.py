@@ -51,7 +51,11 @@ class ReportView(Part):
         else:
             failed = text("check.failed_long", conditions=report.violated_conditions, count=len(report.violations))
             sentence = verdict("bad", text("check.failed"), failed)
-        write(self._verdict, sentence + soft(text("check.note")))
+        plan = self.state.now.plan
+        elbow = (
+            soft(text("target.elbow", away=plan.away)) if self._own is None and plan is not None and plan.away else ""
+        )
+        write(self._verdict, sentence + soft(text("check.note")) + elbow)
         broken = "".join(
             f"<li>{esc(explain_violation(violation, text.language))}</li>" for violation in report.violations[:_LISTED]
         )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rcilab.conformance.free_elbow import leaves_elbow_free
+
 if TYPE_CHECKING:
     from rcilab.i18n.translator import Text
     from rcilab.recording.run import Run
@@ -25,8 +27,10 @@ def error_rows(run: Run, tracking: Tracking, text: Text) -> list[list[str]]:
 
 
 def tracking_notes(run: Run, tracking: Tracking, text: Text) -> list[str]:
-    """Returns the notes to the error table: the compared time, and why the errors may be zero."""
+    """Returns the notes to the error table: what is compared, until when, and why the errors may be zero."""
     notes = []
+    if run.plan is not None and run.model is not None and leaves_elbow_free(run.model, run.setup.mode):
+        notes.append(text("tracking.followed"))
     if run.plan is not None and run.stop_time is not None:
         notes.append(text("tracking.until", time=f"{run.stop_time:.3f}"))
     if run.has_speed_override:

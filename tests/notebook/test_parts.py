@@ -20,6 +20,7 @@ import rcilab.notebook
 from rcilab import notebook
 from rcilab.app.check.report_rows import row_tone
 from rcilab.app.goal.goal_actions import SetLaw
+from rcilab.app.planning import build_plan_view
 from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.i18n.catalogue import load_catalogue, load_ui_catalogue
 from rcilab.i18n.locale import LANGUAGES
@@ -265,6 +266,15 @@ def test_a_goal_that_was_moved_is_told_beside_the_plan(fresh: Lab) -> None:
     fresh.plan.plan.click()
     fresh.jog.sliders[0].value = 1.0
     assert "has moved" in text_of(fresh.plan._sentence)
+
+
+def test_the_report_on_poses_of_an_fr3_has_the_distance_of_the_joints_from_the_plan() -> None:
+    model = rcilab.load_model("FR3")
+    motion = rcilab.plan_joint(model, model.home, model.home + 0.1, speed=0.3)
+    plan = build_plan_view(model, motion, rcilab.check(motion, model)).completed("cartesian_position")
+    with notebook.ReportView(model, language="en") as report:
+        report.state.show(plan)
+        assert f"The joints end up to {np.degrees(plan.away):.1f}° from the plan" in text_of(report._verdict)
 
 
 def test_a_row_of_the_report_has_the_same_tone_as_on_the_page() -> None:

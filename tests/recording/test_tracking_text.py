@@ -13,6 +13,7 @@ from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.text import Text as PageText
 from rcilab.control_process import SupervisorStatus
 from rcilab.i18n.translator import Text
+from rcilab.model.robot_model import load_model
 from rcilab.notebook.status_texts import outcome_html as notebook_outcome
 from rcilab.recording.html_facts import fact_rows
 from rcilab.recording.run_html import run_html
@@ -43,6 +44,14 @@ def test_an_arm_that_lags_is_not_called_exact_and_an_unknown_one_is_not_called_i
     assert notes(some_run()) == []  # MuJoCo.
     assert notes(replace(some_run(), setup=replace(SETUP, plant="ideal"))) == []  # With an impedance it lags, too.
     assert notes(replace(some_ideal_run(), setup=replace(SETUP, plant=""))) == []  # A controller somewhere.
+
+
+@pytest.mark.parametrize(("language", "words"), [("en", "not with the planned elbow"), ("zh", "而不是与规划的肘部")])
+def test_poses_without_the_elbow_are_compared_with_what_they_lead_to(language, words):
+    run = replace(some_run(), model=load_model("FR3"), setup=replace(SETUP, mode="cartesian_position"))
+    (note,) = notes(run, language)
+    assert words in note
+    assert notes(replace(run, setup=SETUP)) == []
 
 
 def test_an_arm_that_yields_says_how_far_from_its_goal_it_ended():

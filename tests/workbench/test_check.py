@@ -20,6 +20,7 @@ from rcilab.app.planning import Plan, build_plan_view
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import PlanProgram, ProgramActions
 from rcilab.app.program.program_draft import Draft, number_at
+from rcilab.app.run.plan_readiness import plan_obstacle
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import Text
 from rcilab.app.view_actions import PLOTS
@@ -257,9 +258,19 @@ def test_the_tab_says_where_the_controller_chooses_the_elbow(name: str, is_free:
     model, text, panel = load_model(name), Text("en"), CheckPanel(Text("en"), lambda request: None)
     motion = plan_joint(model, model.home, model.home + 0.1, speed=0.3)
     plan = build_plan_view(model, motion, check(motion, model))
-    assert text("check.free_elbow") not in panel._headline(plan, None, None, is_current=True)
+    said = "sent without the arm angle"
+    assert said not in panel._headline(plan, None, None, is_current=True)
     there = plan.completed("cartesian_position")
-    assert (text("check.free_elbow") in panel._headline(there, None, None, is_current=True)) is is_free
+    assert (said in panel._headline(there, None, None, is_current=True)) is is_free
+    away = np.degrees(np.abs(there.motion.goal - motion.goal).max())
+    assert (f"up to {away:.1f}° from the plan" in panel._headline(there, None, None, is_current=True)) is is_free
+    done = plan_obstacle(there, there.motion.goal)
+    assert done is not None
+    assert (f"The joints are up to {away:.1f}° from the plan" in text.render(done)) is is_free
+    state = UiState(model=model, goal=goal_at(model, motion.goal), plan=there)
+    line = planned_html(state, SupervisorStatus(phase="idle", q=model.home, q_c=model.home), text)
+    assert (f"The joints end up to {away:.1f}° from the plan" in line) is is_free
+    assert ("工具在此规划的目标处" in Text("zh").render(done)) is is_free
     assert (there.motion is motion) is not is_free
     assert there.completed("joint_position").motion is motion
 

@@ -72,7 +72,9 @@ def plan_obstacle(plan: Plan | None, q_c: JointVector | None) -> Message | None:
             "ready.violations", conditions=plan.report.violated_conditions, count=len(plan.report.violations)
         )
     if q_c is None or not _is_at(q_c, plan.starts_at, plan.model):
-        return message("ready.done" if q_c is not None and is_done(plan, q_c) else "ready.elsewhere")
+        if q_c is None or not is_done(plan, q_c):
+            return message("ready.elsewhere")
+        return message("ready.done_elbow", away=plan.away) if plan.away else message("ready.done")
     return None
 
 

@@ -17,7 +17,11 @@ from rcilab.i18n.translator import Message, message
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
 
-_OF_PROGRAMS = {"ready.done": "ready.done_program", "ready.elsewhere": "ready.elsewhere_program"}
+_OF_PROGRAMS = {
+    "ready.done": "ready.done_program",
+    "ready.done_elbow": "ready.done_program",
+    "ready.elsewhere": "ready.elsewhere_program",
+}
 
 
 def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
@@ -68,7 +72,7 @@ def may_plan_again(reason: Message | None) -> bool:
 
 def may_go_back(state: UiState, reason: Message | None) -> bool:
     """Returns whether the plan has been executed, and its start is a position to which the arm can return."""
-    is_done = reason is not None and reason.code in ("ready.done", _OF_PROGRAMS["ready.done"])
+    is_done = reason is not None and reason.code in ("ready.done", "ready.done_elbow", "ready.done_program")
     return is_done and state.plan is not None and find_outside(state.model, state.plan.starts_at) is None
 
 

@@ -109,7 +109,7 @@ class CheckPanel:
         tone, sign, word, rest = headline
         note = text("check.note") if plan.complete else text("check.incomplete")
         if leaves_elbow_free(plan.model, plan.mode) and not plan.is_recorded:
-            note = "".join(with_space(note, text("check.free_elbow")))
+            note = "".join(with_space(note, text("check.free_elbow", away=plan.away)))
         if aside is not None:
             tone, rest = "warn" if report.ok else tone, f"{rest} {text.render(aside)}"
         lead, rest = with_space(sign + text(word), rest)

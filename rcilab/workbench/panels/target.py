@@ -92,6 +92,8 @@ def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     unheeded = count_unheeded(report) if report.ok else 0
     if unheeded:
         sentence += " · " + text("target.unheeded", count=unheeded)
+    if plan.away:
+        sentence = _with_sentence(sentence, text("target.elbow", away=plan.away), text)
     aside = beside_program(state)
     if aside is not None:
         tone, sentence = "warn" if report.ok else tone, _with_sentence(sentence, text.render(aside), text)
