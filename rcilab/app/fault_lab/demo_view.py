@@ -11,6 +11,7 @@ import numpy as np
 
 from rcilab.conformance.explain import explain_formula, explain_source
 from rcilab.core.arrays import Array
+from rcilab.core.cycle_log import state_cycles
 from rcilab.i18n.condition_values import unit_name, with_unit
 from rcilab.i18n.error_messages import describe_note
 
@@ -31,9 +32,15 @@ def head_html(demo: FaultDemo, text: Text) -> str:
     others = [fault.manual_name for fault in demo.reported if fault is not demo.fault]
     also = f" {text('learn.also', faults=', '.join(others))}" if others else ""
     sent = demo.describe("sent", text.language, text.units)
+    key = f"fault.{demo.fault.key}"
+    reported = (
+        text("learn.reported_name", name=text(key) if text.has(key) else demo.fault.cause)
+        if re.search(r"\d", demo.fault.manual_name)  # The maker names it by its number.
+        else text("learn.reported", number=demo.fault.value)
+    )
     return (
         f'<p class="rl-verdict rl-bad rl-big"><b>◆ {_breakable(demo.fault.manual_name)}</b> '
-        f"{escape(text('learn.reported', number=demo.fault.value))}{escape(also)}</p>"
+        f"{escape(reported)}{escape(also)}</p>"
         f'<p class="rl-note"><b>{escape(text("learn.done"))}</b> {escape(sent)}</p>'
         f"{'' if demo.signal is None else _signal_html(demo, demo.signal, text)}"
     )
@@ -44,9 +51,10 @@ def _signal_html(demo: FaultDemo, signal: FaultSignal, text: Text) -> str:
     row = signal.condition
     value, bound = text.units.format_numbers(row.unit, signal.value, signal.bound)
     unit = unit_name(row.unit, text)
+    by_clock = state_cycles(demo.cycles) > 1  # The record has not every cycle of the controller.
     facts = text(
-        "learn.number", value=value, bound=with_unit(bound, row.unit, text),
-        time=f"{demo.time:.3f}", sample=demo.cycle,
+        ("learn.number_recorded" if signal.has_curve else "learn.number_reported") if by_clock else "learn.number",
+        value=value, bound=with_unit(bound, row.unit, text), time=f"{demo.time:.3f}", sample=demo.cycle,
     )  # fmt: skip
     place = text("check.joint", joint=signal.axis) + " · " if signal.axis else ""
     return (

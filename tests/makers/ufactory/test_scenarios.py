@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from html import escape
+
 import pytest
 
 from rcilab.app.fault_lab import FaultLab
-from rcilab.app.fault_lab.demo_view import body_html
+from rcilab.app.fault_lab.demo_view import body_html, head_html
 from rcilab.app.text import Text
 from rcilab.makers.ufactory.errors import UfactoryError
 from rcilab.makers.ufactory.robots import ROBOTS
@@ -28,6 +30,9 @@ def test_errors_come_with_their_reason_and_the_arm_moves_again():
             assert all(
                 demo.recovery_steps(language)[-1] in body_html(demo, Text(language)) for language in ("en", "zh")
             )
+            assert f"reported by the controller: {escape(fault.cause)}" in head_html(demo, Text("en"))
+            assert "个周期" not in head_html(demo, Text("zh")), "the record has every fifth cycle"
+            assert ("客户端记录" in head_html(demo, Text("zh"))) is demo.signal.has_curve
 
 
 @needs_library
