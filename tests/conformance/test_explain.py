@@ -55,7 +55,7 @@ def violation_of(row: Condition, count: int = 25, model: RobotModel = MODEL) -> 
         worst_time=0.412,
         bound=bound,
         ratio=1.1,
-        advice=advise(row, MOTION, row=400, count=count, ratio=1.1, is_off_start=False),
+        advice=advise(row, MOTION, row=400, count=count, ratio=1.1, is_off_start=False, is_record=row.is_measured),
         links=LinkPair(0, 5) if row.is_clearance else None,
     )
 
