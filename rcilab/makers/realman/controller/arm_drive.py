@@ -92,13 +92,14 @@ class ArmDrive:
         self._restart()
 
     def release(self) -> None:
-        """Ends the motion that lingers after its end, before the arm gets another tool; only while it is still."""
+        """Ends the motion that lingers after its end, before what needs a standing arm; only while it is still."""
         self.arm.discard_motion()
         self.arm.is_monitored = False
 
     def simulate(self, on: bool) -> None:
-        """Begins or ends to show motions only; a simulated arm begins where the real one is."""
+        """Begins or ends to show motions only, while it is still; a simulated arm begins where the real one is."""
         if on is not self.is_simulated:
+            self.release()
             self._only_shown = self.q_c if on else None
             self._restart()
 

@@ -98,8 +98,9 @@ class RealManServer:
         self._peers.append(peer)
 
     def disconnect(self, peer: Peer) -> bool:
-        """Forgets a client; its motions continue."""
+        """Forgets a client and what it has not completed; its motions continue."""
         self._peers.remove(peer)
+        self.controller.trajectories.forget(peer)
         self._files.pop(peer, None)
         if self._pushed_to is not None and self._pushed_to[0] is peer:
             self._pushed_to = None
@@ -202,12 +203,14 @@ class RealManServer:
         self._link.send_frame(peer, encode_answer(answer))
 
     def _report_end(self, trajectory: Trajectory, has_arrived: bool, continues: bool) -> None:
-        if trajectory.peer in self._peers:
+        if trajectory.peer not in self._peers:
+            return
+        for left in reversed(range(trajectory.commands)):
             event = {
                 "state": "current_trajectory_state",
                 "trajectory_state": has_arrived,
                 "device": 0,
-                "trajectory_connect": int(continues),
+                "trajectory_connect": int(continues or left > 0),
             }
             self._answer(trajectory.peer, event)
 

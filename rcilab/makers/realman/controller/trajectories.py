@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import defaultdict
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
-from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.sim.channels import Peer
-from rcilab.sim.planner import SplineTarget, Target, ToolSpeed
+from rcilab.sim.planner import LineTarget, SplineTarget, Target, ToolSpeed
 
 TrajectoryKind: TypeAlias = Literal["movej", "movel", "movec", "moves"]
 FEWEST_SPLINE_POSES = 3
@@ -23,6 +23,8 @@ class Trajectory:
     """Who is notified of its end."""
     is_followed_by_another: bool = False
     """Whether the next one is planned together with it."""
+    commands: int = 1
+    """Of the client, for poses of a spline: each has an event."""
 
 
 class TrajectoryQueue:
@@ -31,8 +33,8 @@ class TrajectoryQueue:
     def __init__(self) -> None:
         self._number = 0
         self._known: dict[int, Trajectory] = {}
-        self._waiting: list[tuple[Target, Trajectory]] = []
-        self._spline: list[Pose] = []
+        self._waiting = defaultdict[Peer | None, list[tuple[Target, Trajectory]]](list)
+        self._splines = defaultdict[Peer | None, list[Pose]](list)
 
     def next_id(self) -> int:
         """Returns the number of the next target."""
@@ -53,30 +55,35 @@ class TrajectoryQueue:
         return known
 
     def add(self, target: Target, trajectory: Trajectory) -> list[Target]:
-        """Adds a target; returns those that are planned now: none as long as another one is to be connected."""
-        self._waiting.append((target, trajectory))
+        """Adds a target; returns those that are planned now: none as long as its client is to connect another one."""
+        self._waiting[trajectory.peer].append((target, trajectory))
         if trajectory.is_followed_by_another:
             return []
-        released, self._waiting = self._waiting, []
+        released = self._waiting.pop(trajectory.peer)
         for waiting, its in released:
             self._known[waiting.id] = its
         return [waiting for waiting, _ in released]
 
     def add_spline(self, pose: Pose, speed: ToolSpeed, trajectory: Trajectory) -> list[Target]:
-        """Adds a pose of a spline; the last one completes it.
-
-        Raises:
-            InvalidValueError: It is the last one, and there are too few.
-        """
-        self._spline.append(pose)
+        """Adds a pose of a spline; the last one completes it. Fewer than three are reached on straight lines."""
+        self._splines[trajectory.peer].append(pose)
         if trajectory.is_followed_by_another:
             return []
-        poses, self._spline = tuple(self._spline), []
-        if len(poses) < FEWEST_SPLINE_POSES:
-            raise InvalidValueError("poses", len(poses), f"a spline needs at least {FEWEST_SPLINE_POSES} poses")
-        return self.add(SplineTarget(id=self.next_id(), poses=poses, speed=speed), trajectory)
+        poses = tuple(self._splines.pop(trajectory.peer))
+        if len(poses) >= FEWEST_SPLINE_POSES:
+            spline = SplineTarget(id=self.next_id(), poses=poses, speed=speed)
+            return self.add(spline, replace(trajectory, commands=len(poses)))
+        for via in poses[:-1]:
+            line = LineTarget(id=self.next_id(), pose=via, speed=speed)
+            self.add(line, replace(trajectory, is_followed_by_another=True))
+        return self.add(LineTarget(id=self.next_id(), pose=pose, speed=speed), trajectory)
 
     def clear(self) -> None:
         """Forgets all that wait."""
         self._waiting.clear()
-        self._spline.clear()
+        self._splines.clear()
+
+    def forget(self, peer: Peer) -> None:
+        """Forgets what waits of a client that has left."""
+        self._waiting.pop(peer, None)
+        self._splines.pop(peer, None)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
 from rcilab.makers.realman.errors import RealManError
+from rcilab.sim.channels import Peer
 from tests.makers.realman.controller.bench import Bench
 
 FRONT = {"RM65": [0, -20000, -70000, 0, -90000, 0], "RM75": [0, 20000, 0, 70000, 0, 90000, 0]}
@@ -121,15 +124,39 @@ def test_a_chain_begins_with_its_last_command_and_its_corner_is_rounded_without_
     assert min(speeds[150:-150]) > 0.01
 
 
-def test_a_spline_takes_three_poses_at_least():
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_spline_has_an_event_for_each_pose_and_fewer_than_three_are_reached_on_lines(count):
     bench = Bench()
     start = bench.pose
-    assert bench.ask("moves", pose=moved(start, y=1000), v=50, trajectory_connect=0)["receive_state"] is False
-    for i in range(3):
-        pose = moved(start, y=20000 * (i + 1), z=10000 * (i % 2))
-        assert bench.ask("moves", pose=pose, v=50, trajectory_connect=int(i < 2))["receive_state"] is True
+    poses = [moved(start, y=20000 * (i + 1), z=10000 * (i % 2)) for i in range(count)]
+    for i, pose in enumerate(poses):
+        answer = bench.ask("moves", pose=pose, v=50, trajectory_connect=int(i < count - 1))
+        assert answer["receive_state"] is True
+    bench.run_until_event()
+    bench.run(3000)
+    np.testing.assert_allclose(bench.pose[:3], poses[-1][:3], atol=1)
+    found = [(event["trajectory_state"], event["trajectory_connect"]) for event in bench.events]
+    assert found == [(True, 1)] * (count - 1) + [(True, 0)]
+
+
+@pytest.mark.parametrize("command", ["movel", "moves"])
+def test_an_unfinished_chain_is_its_clients_and_ends_with_it(command):
+    bench = Bench()
+    start = bench.pose
+    other = Peer("127.0.0.2", bench.server.channels[0])
+    bench.server.connect(other)
+    request = {"command": command, "pose": moved(start, y=50000), "v": 50, "trajectory_connect": 1}
+    bench.server.receive(other, json.dumps(request).encode())
+    bench.frames.clear()
+    bench.ask(command, pose=moved(start, z=20000), v=50, trajectory_connect=0)
     assert bench.run_until_event()["trajectory_state"] is True
-    np.testing.assert_allclose(bench.pose[:3], moved(start, y=60000)[:3], atol=1)
+    np.testing.assert_allclose(bench.pose[:3], moved(start, z=20000)[:3], atol=1)
+    bench.server.disconnect(other)
+    bench.server.connect(other)
+    request |= {"pose": start, "trajectory_connect": 0}
+    bench.server.receive(other, json.dumps(request).encode())
+    bench.run(5)
+    assert bench.controller.drive.planner.queued == 1
 
 
 def test_offsets_and_steps_go_along_the_axes_of_work_frame_and_tool():
@@ -305,6 +332,18 @@ def test_in_simulation_the_arm_stands_while_its_states_move():
     np.testing.assert_array_equal(bench.controller.arm.signals.measured.q, standing)
     bench.ask("set_arm_run_mode", mode=1)
     assert bench.q == q
+
+
+def test_simulation_can_begin_right_after_a_motion():
+    bench = Bench()
+    q = bench.q
+    bench.ask("movej", joint=[q[0] + 5000, *q[1:]], v=50)
+    bench.run_until_event()
+    bench.run(10)
+    assert bench.ask("set_arm_run_mode", mode=0)["mode"] is True
+    bench.run(600)
+    assert bench.err == [0]
+    assert not bench.controller.faults
 
 
 def test_the_emergency_stop_ends_a_motion_and_refuses_the_next():
