@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from math import radians
 
 import numpy as np
@@ -77,6 +78,20 @@ def test_the_error_of_a_refused_command_does_not_stop_the_next_motion(robot):
     assert robot.state.faults == (RealManError.TARGET_OVER_LIMIT,)
     run = robot.execute(plan_joint(robot.model, robot.state.q_c, HOME + 0.1 * OFF, speed=0.4))
     assert (run.faults, robot.state.faults) == ((), ())
+
+
+def test_the_error_of_a_jump_after_a_pause_names_the_late_client(robot):
+    start, slept = robot.state.q_c, []
+
+    def pause(state, t):
+        if t > 0.5 and not slept:
+            slept.append(time.sleep(0.3))
+        u = min(t, 1.0)
+        return JointPosition(start + u**3 * (10.0 - 15.0 * u + 6.0 * u * u) * np.eye(6)[0], finished=u == 1.0)
+
+    with pytest.raises(ControlError, match=r"0x4000 .* no command was sent for \d{3} ms: a callback took long"):
+        robot.control(pause)
+    robot.recover()
 
 
 def test_an_error_ends_a_motion_with_its_name_and_recover_clears_it(robot):
