@@ -110,6 +110,7 @@ class RealManController:
         self._links = SelfCollisionWatch(arm.model)
         self._fence = FenceWatch(arm.model)
         self._is_watching = False
+        self._arrived: list[Trajectory] = []  # Until the arm stands.
         self._number = 0
         self.on_end: Callable[[Trajectory, bool, bool], None] = lambda trajectory, reached, continues: None
         self.on_log: Callable[[str, str], None] = lambda kind, text: None
@@ -390,6 +391,8 @@ class RealManController:
         self._check_surroundings()
         for event in self.drive.events:
             self._handle(event.id, event.kind, event.refusal)
+        if self.drive.is_still or self.drive.planner.state is PlannerState.MOVING:
+            self._report_arrivals()
         if self.streamed and self.drive.is_still:
             self.streamed = ""
         self.state = self._report()
@@ -403,8 +406,19 @@ class RealManController:
             error = REFUSALS[refusal.reason]
             self.set_error(error, refusal.remark)
             self.on_log("refused", f"a trajectory was refused: {error.manual_name}: {refusal.remark}")
-        if trajectory is not None:
-            self.on_end(trajectory, kind is EventKind.REACHED, trajectory.is_followed_by_another)
+        if trajectory is None:
+            return
+        if kind is EventKind.REACHED:
+            self._arrived.append(trajectory)
+        else:
+            self._report_arrivals()
+            self.on_end(trajectory, False, trajectory.is_followed_by_another)
+
+    def _report_arrivals(self) -> None:
+        """Reports the trajectories that have reached their ends: the arm stands, or moves on."""
+        arrived, self._arrived = self._arrived, []
+        for trajectory in arrived:
+            self.on_end(trajectory, True, trajectory.is_followed_by_another)
 
     def _check_surroundings(self) -> None:
         """Stops a motion in which links touch or go beyond the fence; an arm that does so already may move back."""
@@ -427,6 +441,7 @@ class RealManController:
         """Reports the end of every trajectory that a fault has discarded."""
         self.streamed, self.is_teaching, self.program = "", False, None
         self.trajectories.clear()
+        self._report_arrivals()
         for trajectory in self.trajectories.pop_all():
             self.on_end(trajectory, False, False)
 

@@ -334,6 +334,18 @@ def test_in_simulation_the_arm_stands_while_its_states_move():
     assert bench.q == q
 
 
+@ARMS
+def test_the_arm_stands_when_its_client_is_informed_of_the_end(model):
+    bench = Bench(model)
+    q = bench.q
+    for offset in (5000, -7000, 1234):
+        bench.ask("movej", joint=[q[0] + offset, *q[1:]], v=50)
+        assert bench.run_until_event()["trajectory_state"] is True
+        assert not bench.controller.is_moving
+    assert bench.ask("set_joint_en_state", joint_en_state=[1, 0])["joint_en_state"] is True
+    assert bench.err == [0]
+
+
 def test_simulation_can_begin_right_after_a_motion():
     bench = Bench()
     q = bench.q
