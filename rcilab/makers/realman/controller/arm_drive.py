@@ -7,12 +7,11 @@ a client has set.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import degrees, radians
+from math import radians
 
 import numpy as np
 
 from rcilab.core.arrays import JointVector, readonly_copy
-from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
 from rcilab.makers.realman.bounds import ANGLE_STEP, SPEED_ALLOWANCE
 from rcilab.motion.bounds import range_from
@@ -154,20 +153,6 @@ class ArmDrive:
         )
         arm.begin_motion(replace(self._limits, joint=checked), checks_accelerations=False)
         arm.is_monitored = True
-
-
-def require_angles(q: JointVector, limits: Limits) -> None:
-    """Requires joint angles inside their ranges.
-
-    Raises:
-        InvalidValueError: One is outside; it names the joint.
-    """
-    found = find_outside(q, limits)
-    if found is not None:
-        joint, _ = found
-        low, high = np.degrees((limits.joint.lower[joint - 1], limits.joint.upper[joint - 1])).tolist()
-        problem = f"deg is outside its range of {low:.6g} to {high:.6g} deg"
-        raise InvalidValueError(f"joint {joint}", round(degrees(q[joint - 1]), 3), problem)
 
 
 def find_outside(q: JointVector, limits: Limits) -> tuple[int, float] | None:

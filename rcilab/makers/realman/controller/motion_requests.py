@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from math import degrees, pi
@@ -9,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from rcilab.core.errors import InvalidValueError, KinematicsError
+from rcilab.core.errors import InvalidValueError, KinematicsError, UsageError
+from rcilab.core.limits import Limits
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Remark
-from rcilab.makers.realman.controller.arm_drive import find_outside, require_angles
+from rcilab.makers.realman.controller.arm_drive import find_outside
 from rcilab.makers.realman.controller.handler import Getter, Setter, setter
 from rcilab.makers.realman.controller.joint_parameters import require_joint
 from rcilab.makers.realman.controller.realman_controller import RealManController
@@ -84,19 +86,28 @@ def read_angles(controller: RealManController, request: Request, *, inwards: boo
         inwards: Whether a joint that is outside may also have angles from there on.
 
     Raises:
-        InvalidValueError: They are not; the error of the system is set.
+        UsageError: They are not; the error of the system is set.
     """
     q, limits = angles_from_millidegrees(request.integers("joint", controller.model.n)), controller.limits
     if inwards:
         limits = replace(limits, joint=range_from(limits.joint, np.array(controller.drive.q_c)))
+    _require_inside(controller, q, limits)
+    return q
+
+
+def _require_inside(controller: RealManController, q: Sequence[float], limits: Limits) -> None:
+    """Requires joint angles inside the ranges; otherwise the error of the system is set.
+
+    Raises:
+        UsageError: One is outside.
+    """
     found = find_outside(np.array(q), limits)
     if found is not None:
         joint, bound = found
         sentence = f"joint {joint}: {degrees(q[joint - 1]):.6g} deg is beyond its limit of {degrees(bound):.6g} deg"
         reason = Remark(sentence, "target_range", joint=joint, value=q[joint - 1], bound=bound, unit="rad")
         controller.set_error(RealManError.TARGET_OVER_LIMIT, reason)
-        raise InvalidValueError("target", "", sentence)
-    return q
+        raise UsageError(sentence)
 
 
 def read_pose(controller: RealManController, values: tuple[int, ...]) -> Pose:
@@ -171,7 +182,7 @@ def _offset_target(controller: RealManController, offset: Pose, speed: ToolSpeed
     if in_tool:
         return LineTarget(id=number, pose=offset, frame="tool", speed=speed)
     if controller.drive.planner.state is PlannerState.MOVING:
-        raise InvalidValueError("offset", "", "in the work frame is not possible while the arm moves")
+        raise UsageError("the offset in the work frame is not possible while the arm moves")
     T_base_work = controller.settings.T_base_work
     T_work_tool = controller.T_work_tool
     turned = Pose.from_parts(offset.parts[0], (0.0, 0.0, 0.0)) @ Pose.from_parts(T_work_tool.parts[0], (0.0, 0.0, 0.0))
@@ -217,7 +228,7 @@ def _joint_step(controller: RealManController, request: Request, peer: Peer) -> 
     (angle,) = angles_from_millidegrees((step,))
     q = np.array(controller.drive.q_c)
     q[index] += angle
-    require_angles(q, controller.limits)
+    _require_inside(controller, q.tolist(), controller.limits)
     target = JointTarget(
         id=controller.trajectories.next_id(),
         q=tuple(angle if i == index else 0.0 for i in range(controller.model.n)),
@@ -308,7 +319,7 @@ def _continue(controller: RealManController, request: Request) -> None:
 
 def _require_paused(controller: RealManController) -> None:
     if controller.drive.planner.state is not PlannerState.PAUSED:
-        raise InvalidValueError("trajectory", "", "can be deleted after set_arm_pause only")
+        raise UsageError("the trajectory can be deleted after set_arm_pause only")
 
 
 def _delete_current(controller: RealManController, request: Request) -> None:

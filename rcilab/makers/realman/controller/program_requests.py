@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rcilab.core.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.makers.realman.controller.handler import Getter, Setter, setter
 from rcilab.makers.realman.controller.motion_requests import joint_speed, read_angles
 from rcilab.makers.realman.controller.programs import (
@@ -47,7 +47,7 @@ def receive_program(controller: RealManController, request: Request, data: bytes
             controller.programs[number] = program
         if not request.flag("only_save", False):
             _run(controller, number, program, speed, peer)
-    except InvalidValueError as error:
+    except UsageError as error:
         controller.on_log("refused", f"the program was refused: {error}")
         return answer
     return {"command": "download_project", "project_state": True}
@@ -88,7 +88,7 @@ def _stream(controller: RealManController, running: RunningProgram) -> None:
     running.count += 1
     try:
         STREAMS["movej_canfd"](controller, Request("movej_canfd", {"joint": list(point), "trajectory_mode": _ON_CURVE}))
-    except InvalidValueError as error:
+    except UsageError as error:
         controller.on_log("refused", f"the program ended at point {running.count}: {error}")
         controller.stop_at_once()
 
@@ -120,7 +120,7 @@ def _set_default(controller: RealManController, request: Request) -> None:
 def _start_drag(controller: RealManController, request: Request) -> None:
     controller.begin_command()
     if controller.is_moving:
-        raise InvalidValueError("drag teaching", "", "cannot begin while the arm moves")
+        raise UsageError("the drag teaching cannot begin while the arm moves")
     controller.is_dragging, controller.records = True, request.flag("trajectory_record", False)
     controller.recorded = [millidegrees_from_angles(controller.q)] if controller.records else []
 

@@ -328,21 +328,21 @@ class RealManController:
         """Requires an arm that can move.
 
         Raises:
-            InvalidValueError: A joint is disabled or has an error, an error is set, or the emergency stop is pressed.
+            UsageError: A joint is disabled or has an error, an error is set, or the emergency stop is pressed.
         """
         lasting = [error for error in self.system_errors if error not in REFUSED_COMMANDS]
         if self.is_dragging:
-            raise InvalidValueError("motion", "", "is not possible: drag teaching is on; stop_drag_teach ends it")
+            raise UsageError("the motion is not possible: drag teaching is on; stop_drag_teach ends it")
         if self.button != "none":
-            raise InvalidValueError("motion", "", "is not possible: the emergency stop is pressed")
+            raise UsageError("the motion is not possible: the emergency stop is pressed")
         if lasting:
-            raise InvalidValueError("motion", "", f"is not possible: {lasting[0].manual_name}; clear_system_err")
+            raise UsageError(f"the motion is not possible: {lasting[0].manual_name}; clear_system_err")
         for joint, (word, is_on) in enumerate(zip(self.joint_errors, self.enabled, strict=True), 1):
             self._require_no_error(joint, word)
             if not is_on:
                 problem = f"joint {joint} is disabled; set_joint_en_state enables it"
                 self.set_error(RealManError.JOINT_DISABLED, Remark(problem, "joint_disabled", joint=joint))
-                raise InvalidValueError("motion", "", f"is not possible: {problem}")
+                raise UsageError(f"the motion is not possible: {problem}")
 
     def begin_command(self) -> None:
         """Prepares for a motion command: the errors of refused ones are gone."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rcilab.core.errors import DecodeError, InvalidValueError
+from rcilab.core.errors import DecodeError, UsageError
 from rcilab.makers.realman.bounds import CLIENT_PORT, PUSH_PERIOD
 from rcilab.makers.realman.controller import (
     fence_requests,
@@ -169,7 +169,7 @@ class RealManServer:
         is_done = True
         try:
             setter.run(self.controller, request, peer)
-        except InvalidValueError as error:
+        except UsageError as error:
             is_done = False
             text = f"{request.command} was refused: {error}"
             self._link.log("refused", text, request=request.command, status="REFUSED")
@@ -178,7 +178,7 @@ class RealManServer:
     def _get(self, peer: Peer, request: Request, getter: Getter) -> None:
         try:
             self._answer(peer, getter(self.controller, request))
-        except InvalidValueError as error:
+        except UsageError as error:
             text = f"{request.command} was refused: {error}"
             self._link.log("refused", text, request=request.command, status="REFUSED")
 
@@ -186,7 +186,7 @@ class RealManServer:
         is_taken = True
         try:
             file_size(request)
-        except InvalidValueError as error:
+        except UsageError as error:
             is_taken = False
             self._link.log("refused", f"run_project was refused: {error}", request="run_project", status="REFUSED")
         else:
@@ -196,7 +196,7 @@ class RealManServer:
     def _stream(self, request: Request) -> None:
         try:
             STREAMS[request.command](self.controller, request)
-        except InvalidValueError:
+        except UsageError:
             self.controller.ignored += 1
 
     def _answer(self, peer: Peer, answer: Mapping[str, object]) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from rcilab.core.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.makers.realman.bounds import FASTEST_TOOL, MOST_SENSITIVE, STRONGEST_TOOL
 from rcilab.makers.realman.controller.handler import Getter, Setter, setter
 from rcilab.makers.realman.controller.realman_controller import RealManController
@@ -64,7 +64,7 @@ def _set_collision_stage(controller: RealManController, request: Request) -> Non
 
 def _set_run_mode(controller: RealManController, request: Request) -> None:
     if controller.is_moving:
-        raise InvalidValueError("mode", "", "cannot be changed while the arm moves")
+        raise UsageError("the mode cannot be changed while the arm moves")
     controller.drive.simulate(not request.flag("mode"))
 
 

@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from rcilab.core.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Remark
 from rcilab.makers.realman.bounds import LARGEST_STREAM_STEP
@@ -104,7 +104,7 @@ def _require_near(controller: RealManController, q: Sequence[float]) -> None:
 def _follow(controller: RealManController, kind: str, refusal: Refusal | None) -> None:
     if refusal is not None:
         controller.set_error(REFUSALS[refusal.reason], refusal.remark)
-        raise InvalidValueError("target", "", str(refusal.remark))
+        raise UsageError(str(refusal.remark))
     controller.streamed = kind
 
 

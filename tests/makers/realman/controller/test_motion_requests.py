@@ -487,3 +487,11 @@ def test_a_stream_leads_a_joint_back_into_its_range():
     bench.run(500)
     assert bench.q[5] == pytest.approx(-2950, abs=2)
     assert bench.err == [0]
+
+
+def test_a_step_beyond_a_range_is_refused_with_its_error_and_number():
+    bench = Bench()
+    assert bench.ask("set_joint_step", joint_step=[1, 400000], v=30)["receive_state"] is False
+    assert bench.controller.system_errors == (RealManError.TARGET_OVER_LIMIT,)
+    (line,) = [text for _, text in bench.logged if "set_joint_step was refused" in text]
+    assert "'" not in line
