@@ -183,7 +183,10 @@ class Planner:
 
     def end(self) -> None:
         """Stops on the path, inside the speed of the target, and discards all targets (slow stop)."""
-        if self._mover is not None:
+        if isinstance(self._mover, VelocityMover):
+            self._mover.end()
+            self._pending += self._queue.discard()
+        elif self._mover is not None:
             self.stop()
         elif self._queue.is_stationary:
             self._pending += self._queue.discard()

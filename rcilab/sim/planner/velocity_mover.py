@@ -122,6 +122,10 @@ class VelocityMover:
         self._end = lambda jog: jog.set_twist(np.zeros(6), frame=frame)
         self._begin(limits, lambda jog: jog.set_twist(twist, frame=frame), any(twist), duration)
 
+    def end(self) -> None:
+        """Stops as after the time of its command: a tool on its line."""
+        self._cycles = 0
+
     def step(self) -> list[float]:
         """Advances one cycle and returns the joint angles, n plain floats, [rad]."""
         stop = self._stop

@@ -291,6 +291,23 @@ def test_teaching_moves_until_it_is_stopped():
     assert not bench.controller.is_moving
 
 
+@ARMS
+def test_the_tool_stays_on_its_line_while_teaching_stops(model):
+    bench = Bench(model)
+    bench.ask("movej", joint=FRONT[model], v=100)
+    bench.run_until_event()
+    start = bench.pose
+    bench.ask("set_pos_teach", teach_type="y", direction="pos", v=100)
+    bench.run(700)
+    bench.ask("set_stop_teach")
+    bench.run(1000)
+    assert not bench.controller.is_moving
+    end = bench.pose
+    assert end[1] > start[1] + 50000
+    np.testing.assert_allclose([end[0], end[2]], [start[0], start[2]], atol=500)  # [0.001 mm]
+    np.testing.assert_allclose(np.abs(end[3:]), np.abs(start[3:]), atol=3)  # [0.001 rad] Half a turn has two signs.
+
+
 def test_poses_are_in_the_work_frame_and_of_the_tool():
     bench = Bench()
     start = bench.pose
