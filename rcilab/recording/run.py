@@ -18,7 +18,7 @@ from rcilab.core.cycle_log import state_cycles
 from rcilab.core.errors import SAFETY_STOP, ControlError, UsageError, plain_text
 from rcilab.core.fault import FaultCode, name_faults
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
-from rcilab.core.state import require_mode
+from rcilab.core.state import MODES, Mode
 from rcilab.i18n.notebook_language import language
 from rcilab.i18n.translator import Remark
 from rcilab.i18n.units import USUAL, Units
@@ -281,13 +281,14 @@ class Run:
 
     @property
     def report(self) -> Report | None:
-        """Check of the plan in the mode of the run; None without a plan or an arm.
+        """Check of the plan in the mode of the run, of its joint angles if that is unknown; None without plan or arm.
 
         Computed at each access, with the current conditions.
         """
         if self.plan is None or self.model is None:
             return None
-        return check(self.plan, self.model, mode=require_mode(self.setup.mode or "joint_position"))
+        known: list[Mode] = [mode for mode in MODES if mode == self.setup.mode]
+        return check(self.plan, self.model, mode=known[0] if known else "joint_position")
 
     def commanded(self) -> Motion:
         """Returns the motion that the controller reports as commanded, on the 1 ms grid, without the play-out delay.

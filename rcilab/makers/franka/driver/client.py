@@ -11,7 +11,7 @@ import numpy as np
 
 from rcilab.core.arrays import Matrix
 from rcilab.core.command import Command
-from rcilab.core.errors import CommandRejectedError, RcilabError
+from rcilab.core.errors import CommandRejectedError, ConnectionLostError, RcilabError
 from rcilab.core.spatial import as_pose
 from rcilab.core.state import ControllerMode
 from rcilab.makers.address import ControllerAddress
@@ -21,6 +21,7 @@ from rcilab.makers.franka.driver.state_reader import number_of
 from rcilab.makers.network import find_route
 
 ANSWER_TIMEOUT = 5.0  # [s] For the answer to a request, which a controller gives within a few cycles. A tuning value.
+_STATE_TIMEOUT = 1.0  # [s] After which both client libraries end the wait for a state.
 
 
 class FciClient(ABC):
@@ -46,6 +47,8 @@ class FciClient(ABC):
     """Whether poses can be sent with the elbow."""
 
     def __init__(self, library: Any, address: ControllerAddress, state_size: int) -> None:
+        self._name = str(address)
+
         def open_robot() -> tuple[Any, Any]:
             robot = library.Robot(address.host, library.RealtimeConfig.kIgnore)
             state = robot.read_once()
@@ -81,12 +84,17 @@ class FciClient(ABC):
         """Returns the newest state if one arrives within a timeout, [s]; older ones are dropped.
 
         Raises:
-            ConnectionLostError: The controller has closed the connection.
+            ConnectionLostError: The controller has closed the connection, or sends no further state.
         """
         if not self.sockets.wait_for_state(number_of(self.newest), timeout):
             return None
-        with self.request("state"):
-            self.newest = self.robot.read_once()
+        try:
+            with self.request("state"):
+                self.newest = self.robot.read_once()
+        except CommandRejectedError as error:  # Nothing was requested: the library waits for another state.
+            raise ConnectionLostError(
+                f"{self._name}: no state for {_STATE_TIMEOUT:g} s; check that the controller runs, and connect again"
+            ) from error
         return self.newest
 
     def close(self) -> None:

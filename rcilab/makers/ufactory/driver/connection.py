@@ -27,6 +27,7 @@ _BUTTONS = (
     UfactoryError.EMERGENCY_STOP_SWITCH,
 )
 _UNDERWAY_NS = 50_000_000  # For a slow report that was sent before an error was read.
+_STILL = 2
 _SLOW = 0.5  # [s] For the next slow report; they come every 0.2 s.
 
 
@@ -46,7 +47,7 @@ class XArmConnection(LibraryConnection[bytes]):
         client: The client library.
         shown: What the controller is doing.
         error: Number of the error that is set; 0: none.
-        is_still: Whether the arm is commanded the same joint angles in the newest two states.
+        is_still: Whether the arm is commanded the same joint angles in three states: two may be about a turn.
 
     Args:
         client: As the attribute.
@@ -60,6 +61,7 @@ class XArmConnection(LibraryConnection[bytes]):
         self.shown = Shown(0, 0, 0)
         self.error = 0
         self.is_still = False
+        self._same = 0  # States with the joint angles of the one before.
         self._error_ns = 0
         self._reader = StateReader(n)
         self._user_frame: tuple[tuple[float, ...], Pose] = (), IDENTITY
@@ -88,7 +90,9 @@ class XArmConnection(LibraryConnection[bytes]):
         self._reader.T_base_user = self.T_base_user
         faults = faults_of(self.error)
         state = self._reader.read(report, faults, self._fault_mode(faults), is_streaming=self.is_streaming)
-        self.is_still = self.latest is not None and np.array_equal(state.q_c, self.latest.q_c)
+        is_same = self.latest is not None and np.array_equal(state.q_c, self.latest.q_c)
+        self._same = self._same + 1 if is_same else 0
+        self.is_still = self._same >= _STILL
         return state
 
     def _update_error(self, before: Shown) -> None:
