@@ -15,6 +15,9 @@ _CHECKED_FRACTIONS = (0.25, 0.5, 0.75, 1.0)
 """Instants of a cycle at which the curve is checked besides its start, in cycles. Its end is not the start of the next
 one: where the path's third derivative jumps within a cycle, as at the via orientation of an arc, so does the jerk."""
 
+_QUADRATIC = 3
+"""Number of coefficients of the jerk, whose largest value within a cycle is exact."""
+
 
 def cycle_quintics(path: State, law: TimeParametrization, rows: slice) -> list[Array]:
     """Returns the coefficients by ascending power of the time since the cycle began, each of shape (N - 1, n).
@@ -47,4 +50,12 @@ def peak_derivatives(powers: list[Array]) -> Iterator[Array]:
                 value *= part * CYCLE_TIME
                 value += coefficient
             np.maximum(largest, np.abs(value), out=largest)
+        if len(powers) == _QUADRATIC:
+            np.maximum(largest, _vertex(*powers), out=largest)
         yield largest
+
+
+def _vertex(constant: Array, linear: Array, square: Array) -> Array:
+    """Returns the absolute value of a quadratic at its vertex, or at the end of the cycle nearest to it."""
+    time = np.clip(-0.5 * linear / np.where(square == 0.0, np.inf, square), 0.0, CYCLE_TIME)
+    return np.abs(constant + time * (linear + time * square))

@@ -58,8 +58,7 @@ def require_allowed(model, motion, speed):
         assert monitor.step(model.forward(q), angles(model, q)) == [], monitor.violations()
     times = np.linspace(0.0, motion.duration, 7 * len(motion))
     joint = model.limits.joint
-    # The planner checks the jerk at five instants of a cycle.
-    for order, bound in ((1, speed * joint.velocity), (2, speed * joint.acceleration), (3, 1.01 * joint.jerk)):
+    for order, bound in ((1, speed * joint.velocity), (2, speed * joint.acceleration), (3, 1.0001 * joint.jerk)):
         assert (np.abs(motion.polynomial.sample(times, order)) < bound).all()
     assert ((joint.lower < motion.q) & (motion.q < joint.upper)).all()
 
@@ -101,6 +100,7 @@ def test_a_line_is_straight_allowed_smooth_and_exact_at_its_ends(name, seed, spe
 @given(names, seeds, speeds)
 @example("xMatePro3", 9108064, 1.0)  # It ends below the floor.
 @example("xArm6", 80, 1.0)  # The jerk jumps where the tool passes via.
+@example("xArm6", 84848801, 1.0)  # It is largest between the instants at which the other derivatives are checked.
 def test_an_arc_is_round_allowed_and_smooth(name, seed, speed):
     model = MODELS[name]
     q, via, goal, psi = ends(model, seed, 0.4)
