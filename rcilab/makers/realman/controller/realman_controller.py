@@ -63,7 +63,7 @@ class RealManController:
         recorded: The points of the last recording, [0.001 deg].
         programs: Those that are stored, by number.
         program: The one that runs.
-        default_program: Number of the one that an input starts; 0 is none.
+        default_program: Number of the one that an input starts; 0: no program.
         reason: Reason for the last error.
         state: The last state.
         on_end: Called with a trajectory that has ended, and whether it reached its end.
