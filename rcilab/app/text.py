@@ -26,5 +26,5 @@ class Text(translator.Text):
         return item.explain(self.language, self.units)
 
     def unit(self, usual: str) -> Unit:
-        """Returns the unit in which numbers of a field are shown and typed, for "deg" or "mm"."""
+        """Returns the unit in which numbers of a field are shown and typed, for "deg", "mm" or a rate."""
         return self.units.unit(usual)

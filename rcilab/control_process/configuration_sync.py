@@ -26,6 +26,8 @@ class ConfigurationSync:
         """The whole configuration that was requested last."""
         self.acknowledged = RobotConfiguration()
         """The parts that the controller has accepted since it was connected."""
+        self.reported = RobotConfiguration()
+        """What the controller has reported after the last request."""
         self.connections = 0
         """Number of connections at which it has accepted a configuration."""
         self._pending: list[tuple[PendingRequest, RobotConfiguration, bool]] = []
@@ -48,7 +50,9 @@ class ConfigurationSync:
         while self._pending and self._pending[0][0].done:
             request, setup, is_new_connection = self._pending.pop(0)
             if is_new_connection:
-                self.acknowledged = RobotConfiguration()
+                self.acknowledged = self.reported = RobotConfiguration()
+            if request.reported is not None:
+                self.reported = request.reported
             if request.error is not None:
                 self._refusal = request.error
                 # It may have accepted some of these parts: which ones it has now is unknown.

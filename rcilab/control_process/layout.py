@@ -38,7 +38,7 @@ from rcilab.core.errors import UsageError, VersionMismatchError
 from rcilab.core.shared_memory import PAGE, open_shared_memory, whole_pages
 
 MAGIC = b"RCILABCP"
-VERSION = 10  # Increment with every change of this file, of the snapshot or of `cycle_dtype`.
+VERSION = 11  # Increment with every change of this file, of the snapshot or of `cycle_dtype`.
 
 RING_CYCLES = 32768  # 33 s: the longest time between two reads without a loss.
 MOTION_TIME = 300.0  # [s] Longest motion that fits into the block.

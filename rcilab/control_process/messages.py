@@ -156,6 +156,8 @@ class Reply:
 
     id: int
     error: RcilabError | None = None
+    reported: RobotConfiguration | None = None
+    """What the controller reports of its configuration, after it was connected or configured."""
 
 
 def as_sendable(error: Exception) -> RcilabError:

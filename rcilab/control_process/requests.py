@@ -15,6 +15,7 @@ from typing import Generic, TypeVar
 from rcilab.control_process.layout import MESSAGE_SIZE, MESSAGE_SLOTS, ControlBlock, Counter
 from rcilab.control_process.messages import End, NumberedRequest, Reply, Request, as_sendable
 from rcilab.core.errors import DeadlineError, RcilabError, UsageError
+from rcilab.makers.configuration import RobotConfiguration
 
 _LENGTH = struct.Struct("<I")
 _Message = TypeVar("_Message")
@@ -83,6 +84,8 @@ class PendingRequest:
         self._what = what
         self._event = threading.Event()
         self._error: RcilabError | None = None
+        self.reported: RobotConfiguration | None = None
+        """See `Reply`."""
 
     @property
     def done(self) -> bool:
@@ -112,10 +115,10 @@ class PendingRequest:
         if self._error is not None:
             raise self._error
 
-    def settle(self, error: RcilabError | None = None) -> None:
+    def settle(self, error: RcilabError | None = None, reported: RobotConfiguration | None = None) -> None:
         """Marks it done; called by the supervisor. Only the first call has an effect."""
         if not self._event.is_set():
-            self._error = error
+            self._error, self.reported = error, reported
             self._event.set()
 
     def __repr__(self) -> str:
@@ -156,9 +159,11 @@ class RequestChannel:
         """Queues a request again: `pop` returns it later."""
         self._deferred.append(request)
 
-    def answer(self, request: NumberedRequest, error: Exception | None = None) -> None:
-        """Sends the reply to a request: success, or the error."""
-        self._replies.post(Reply(request.id, None if error is None else as_sendable(error)))
+    def answer(
+        self, request: NumberedRequest, error: Exception | None = None, reported: RobotConfiguration | None = None
+    ) -> None:
+        """Sends the reply to a request: success, with what the controller reports after it, or the error."""
+        self._replies.post(Reply(request.id, None if error is None else as_sendable(error), reported))
 
 
 class RequestClient:
@@ -205,7 +210,7 @@ class RequestClient:
         while (reply := self._replies.pop()) is not None:
             pending = self._pending.pop(reply.id, None)
             if pending is not None:
-                pending.settle(reply.error)
+                pending.settle(reply.error, reply.reported)
             if reply.error is not None:
                 errors.append(reply.error)
         return errors

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from rcilab.control_process.layout import Counter
 from rcilab.control_process.status import PHASES, Phase
 
-_RECORD = struct.Struct("<BbBBqIIddd4d96s1024s")
-_NO_LOAD = (-1.0, 0.0, 0.0, 0.0)
+_RECORD = struct.Struct("<BbBBqIIddd96s1024s")
 _ATTEMPTS = 1000  # The writer needs about 3 us; more failures mean that it ended while writing.
 
 
@@ -32,8 +31,6 @@ class Snapshot:
     rate_hz: float = 0.0
     motion_time: float | None = None
     motion_duration: float | None = None
-    load: tuple[float, float, float, float] | None = None
-    """Mass, [kg], and centre of mass in the flange frame, [m], as the controller reports them; None: it does not."""
 
 
 def write_snapshot(memory: memoryview, counters: memoryview, snapshot: Snapshot) -> None:
@@ -53,7 +50,6 @@ def write_snapshot(memory: memoryview, counters: memoryview, snapshot: Snapshot)
         snapshot.rate_hz,
         -1.0 if snapshot.motion_time is None else snapshot.motion_time,
         -1.0 if snapshot.motion_duration is None else snapshot.motion_duration,
-        *(_NO_LOAD if snapshot.load is None else snapshot.load),
         snapshot.code.encode(),
         _encode(snapshot.message, 1024),
     )
@@ -69,9 +65,7 @@ def read_snapshot(memory: memoryview, counters: memoryview) -> Snapshot:
         if before % 2 == 0 and counters[Counter.SNAPSHOT] == before:
             break
     facts = _RECORD.unpack(data)
-    phase, powered, is_fifo, locked, inputs, outputs_known, outputs, rate_hz, time, duration, *load, code, message = (
-        facts
-    )
+    phase, powered, is_fifo, locked, inputs, outputs_known, outputs, rate_hz, time, duration, code, message = facts
     return Snapshot(
         phase=PHASES[phase] if phase < len(PHASES) else "starting",
         code=_text(code),
@@ -85,7 +79,6 @@ def read_snapshot(memory: memoryview, counters: memoryview) -> Snapshot:
         rate_hz=rate_hz,
         motion_time=None if time < 0.0 else time,
         motion_duration=None if duration < 0.0 else duration,
-        load=None if load[0] < 0.0 else (load[0], load[1], load[2], load[3]),
     )
 
 

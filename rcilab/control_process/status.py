@@ -14,7 +14,6 @@ from rcilab.core.fault import FaultCode
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, Mode, RobotMode
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.model.dynamics.payload import Payload
 
 __all__ = ["MESSAGES", "PHASES", "Incident", "Lateness", "Phase", "SupervisorStatus", "cycle_dtype"]
 
@@ -133,10 +132,10 @@ class SupervisorStatus:
     """External wrench as estimated by the controller, base axes, shape (6,), [N, N m]."""
     T_flange_tool: Pose | None = None
     """The controller's tool, from the poses it reports at standstill; None while unknown."""
-    load: Payload | None = None
-    """The controller's load, without its inertia, as it reports it; None where it does not, or while unknown."""
     setup: RobotConfiguration = field(default_factory=RobotConfiguration)
-    """The configuration that the controller has accepted since it was connected; it cannot be read back."""
+    """The configuration that the controller has accepted since it was connected."""
+    reported: RobotConfiguration = field(default_factory=RobotConfiguration)
+    """What it has reported of its configuration since; None for what its interface does not report."""
     setup_times: int = 0
     """Number of connections at which the controller has accepted a configuration."""
     robot_mode: RobotMode | None = None

@@ -17,7 +17,6 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, RobotMode
 from rcilab.makers.maker import Maker
-from rcilab.model.dynamics.payload import Payload
 from rcilab.recording.run import find_delay
 
 _PERIOD = 0.5  # [s] between two samples; the delay changes slowly.
@@ -61,9 +60,6 @@ class StatusReader:
             "rate_hz": shown.rate_hz,
             "scheduling": "SCHED_FIFO" if shown.is_fifo else "normal",
             "memory_locked": shown.memory_locked,
-            "load": None
-            if shown.load is None
-            else Payload(mass=shown.load[0], center_of_mass=np.array(shown.load[1:])),
             "late_cycles": late_cycles(self._block.histogram),
             "lost_cycles": self._block.counters[Counter.LOST],
             "lateness": summarise(self._block.histogram),

@@ -168,6 +168,7 @@ class Supervisor(Closeable):
                 controller_pid=monitor.processes.controller_pid,
                 worker_pid=monitor.processes.worker_pid,
                 setup=self._setup.acknowledged,
+                reported=self._setup.reported,
                 setup_times=self._setup.connections,
                 **fields,
                 **self._read_override(shown),

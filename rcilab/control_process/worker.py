@@ -201,21 +201,22 @@ class ControlProcess:
     def _handle_requests(self) -> None:
         while (request := self._requests.pop()) is not None:
             try:
-                self._handle(request.body)
+                reported = self._handle(request.body)
             except RcilabError as error:
                 self._report_failure(request, error)
             except Exception as error:
                 self._report_failure(request, error)
                 raise
             else:
-                self._requests.answer(request)
+                self._requests.answer(request, reported=reported)
 
-    def _handle(self, request: Request) -> None:
+    def _handle(self, request: Request) -> RobotConfiguration | None:
+        """Handles a request; returns what the controller reports of its configuration, if that may have changed."""
         match request:
             case Connect():
-                self._connect(request)
+                return self._connect(request)
             case Configure():
-                self._configure(request.configuration)
+                return self._configure(request.configuration)
             case SetPower():
                 self._set_power(request.on)
             case SetOutput():
@@ -245,6 +246,7 @@ class ControlProcess:
                 raise UsageError("no motion is running whose speed override could change").coded("override_idle")
             case End():
                 self._is_ending = True
+        return None
 
     def _report_failure(self, request: NumberedRequest, error: Exception) -> None:
         if isinstance(error, StoppedError):
@@ -265,7 +267,7 @@ class ControlProcess:
         self._disconnect()
         self._status.set_phase("lost", code, error=str(error))
 
-    def _connect(self, request: Connect) -> None:
+    def _connect(self, request: Connect) -> RobotConfiguration:
         self._disconnect()
         self._address = request.address
         self._status.set_phase("connecting", "connecting", address=self._address)
@@ -278,17 +280,15 @@ class ControlProcess:
             self._record([driver.latest])  # Before it is ready: the newest row may be from an earlier process.
         self._tool_source = None
         self._read_power()
-        self._configure(request.configuration)
+        return self._configure(request.configuration)
 
-    def _configure(self, configuration: RobotConfiguration) -> None:
+    def _configure(self, configuration: RobotConfiguration) -> RobotConfiguration:
         driver = self._require_driver()
         self._model = configuration.applied_to(self._model)
         driver.configure(configuration)
-        load = driver.load
-        if load is not None:
-            x, y, z = load.center_of_mass.tolist()
-            self._status.update(load=(load.mass, x, y, z))
+        reported = driver.read_configuration()
         self._report_ready()
+        return reported
 
     def _set_power(self, on: bool) -> None:
         self._require_driver().power(on)

@@ -9,13 +9,16 @@ import math
 import re
 from dataclasses import dataclass
 
-from rcilab.i18n.translator import Message, message
+from rcilab.i18n.translator import ComparedValue, Message, message
 
 _AMBIGUOUS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 """A number whose comma can be a decimal comma or a thousands separator, such as 1,000."""
+_RATES = ("/s", "/s²", "/s³")
 _UNITS: dict[str, dict[str, float]] = {
     "deg": {"deg": 1.0, "°": 1.0, "rad": math.degrees(1.0)},
     "mm": {"mm": 1.0, "m": 1000.0},
+    **{f"°{per}": {f"°{per}": 1.0, f"deg{per}": 1.0, f"rad{per}": math.degrees(1.0)} for per in _RATES},
+    **{f"mm{per}": {f"mm{per}": 1.0, f"m{per}": 1000.0} for per in _RATES},
 }
 """Units accepted after a number, by the field's unit, each in the field's unit; longer names first."""
 _MAX_LENGTH = 40  # Characters; longer than any number in normal use.
@@ -48,6 +51,7 @@ def parse_number(
     shown = typed.strip()
     shown = shown if len(shown) <= _MAX_LENGTH else shown[: _MAX_LENGTH - 1] + "…"
     plain = typed.strip()[: 10 * _MAX_LENGTH].replace("−", "-").replace("–", "-")
+    plain = plain.replace("^2", "²").replace("^3", "³")
     suffix = next((name for name in _UNITS.get(unit, {unit: 1.0}) if name and plain.endswith(name)), "")
     plain = plain.removesuffix(suffix).strip()
     if not plain:
@@ -80,7 +84,13 @@ def _bounds(low: float, high: float, unit: str) -> Message:
         return message("parse.bounds.plain", low=format_short(low), high=format_short(high))
     if unit not in _UNITS:
         return message("parse.bounds", low=format_short(low), high=format_short(high), unit=unit)
-    scale = math.pi / 180.0 if unit == "deg" else 1e-3
+    angle = unit.startswith(("deg", "°"))
+    scale = math.pi / 180.0 if angle else 1e-3
+    if "/" in unit:
+        rate = ("rad" if angle else "m") + unit[unit.index("/") :]
+        ends = scale * low, scale * high
+        shown = (ComparedValue(end, other, rate) for end, other in (ends, ends[::-1]))
+        return message("parse.bounds.plain", low=next(shown), high=next(shown))
     return message(f"parse.bounds.{unit}", low=scale * low, high=scale * high)
 
 

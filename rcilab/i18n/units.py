@@ -36,26 +36,29 @@ _FIXED = {
 
 @dataclass(frozen=True)
 class Unit:
-    """The unit shown for degrees or for millimetres."""
+    """The unit shown for degrees or millimetres, or for a rate of them."""
 
     name: str
-    """deg, rad, mm or m."""
+    """deg, rad, mm or m, or such as rad/s²."""
     factor: float
     """One degree, or one millimetre, in this unit."""
 
     def convert(self, number: str) -> str:
-        """Converts the text of a number in degrees or millimetres to this unit; any other text is unchanged."""
+        """Converts the text of a number in the usual unit to this unit; any other text is unchanged."""
         if self.factor == 1.0:
             return number
         try:
             value = float(number)
         except ValueError:
             return number
+        if self.name not in _MORE_DIGITS:  # A rate.
+            return f"{self.factor * value:g}"
         return format_fixed(self.factor * value, len(number.partition(".")[2]) + _MORE_DIGITS[self.name])
 
     def complete(self, typed: str) -> str:
         """Appends this unit to a typed number, unless it is the usual unit or a unit was typed."""
-        return typed if self.factor == 1.0 or not typed.strip()[-1:].isdigit() else f"{typed.strip()} {self.name}"
+        has_unit = "/" in typed or not typed.strip()[-1:].isdecimal()
+        return typed if self.factor == 1.0 or has_unit else f"{typed.strip()} {self.name}"
 
 
 @dataclass(frozen=True)
@@ -66,11 +69,12 @@ class Units:
     length: LengthUnit = "mm"
 
     def unit(self, usual: str) -> Unit:
-        """Returns the unit shown for "deg" or "mm"; any other unit is unchanged."""
-        if usual in ("deg", "°") and self.angle == "rad":
-            return Unit("rad", math.pi / 180.0)
-        if usual == "mm" and self.length == "m":
-            return Unit("m", 1e-3)
+        """Returns the unit shown for "deg" or "mm", or a rate such as "°/s"; any other unit is unchanged."""
+        base, per, time = usual.partition("/")
+        if base in ("deg", "°") and self.angle == "rad":
+            return Unit(f"rad{per}{time}", math.pi / 180.0)
+        if base == "mm" and self.length == "m":
+            return Unit(f"m{per}{time}", 1e-3)
         return Unit(usual, 1.0)
 
     def format_angle(self, angle: float, digits: int = 1) -> str:

@@ -23,7 +23,6 @@ from rcilab.makers.maker import Maker, all_makers
 from rcilab.robots import DhRow
 
 if TYPE_CHECKING:
-    from rcilab.model.dynamics.payload import Payload
     from rcilab.model.robot_model import RobotModel
 
 GuideSpace: TypeAlias = Literal["joint", "cartesian"]
@@ -176,9 +175,8 @@ class Driver(Protocol):
     poll: Callable[[float], list[RobotState]]
     """`poll(timeout)` returns every state that has arrived, oldest first; waits up to timeout, [s], for the first."""
 
-    @property
-    def load(self) -> Payload | None:
-        """The load that a client sets, as the controller reports it; None where it reports none."""
+    def read_configuration(self) -> RobotConfiguration:
+        """Returns what the controller reports of the configuration that a client sets; None for what it does not."""
         ...
 
     @property

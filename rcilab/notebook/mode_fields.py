@@ -9,7 +9,15 @@ import ipywidgets
 
 from rcilab.app.arm_features import explain_missing_feature, is_only_planned
 from rcilab.app.run.mode_actions import ModeActions, PressControl, SetControl
-from rcilab.app.run.mode_parameters import held_rows, is_control_pending, name_group, shown_numbers
+from rcilab.app.run.mode_parameters import (
+    held_rows,
+    is_control_pending,
+    name_group,
+    shown_numbers,
+    typed_range,
+    typed_scale,
+    typed_value,
+)
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.state import MODES
 from rcilab.i18n.translator import Text
@@ -91,7 +99,7 @@ class ModeFields:
         if state.now.drive.refusal is not None:
             return problem(text("ready.control_refused", error=text.render(state.now.drive.refusal)))
         known = state.session is None and state.robot is not None and state.now.is_virtual
-        rows = held_rows(self._groups, state.now.drive.mode, status.setup.control, text, is_known=known)
+        rows = held_rows(self._groups, state.now.drive.mode, status, text, is_known=known)
         held = soft(text("control.held")) + table([], [list(row) for row in rows])
         return held + (f'<p class="rl-soft"><b>{esc(text("control.pending"))}</b></p>' if pending else "")
 
@@ -111,9 +119,6 @@ class ModeFields:
         with self._state.lock:
             self._modes.handlers[type(request)](request)
             self._state.notify("robot")
-
-    def _set_number(self, group: str, index: int, value: float) -> None:
-        self._ask(SetControl(group=group, index=index, value=value))
 
     def _folder(self, group: ParameterGroup) -> Any:
         """Returns a group whose fields are created when it is opened: forty of them would delay the cell."""
@@ -140,14 +145,17 @@ class ModeFields:
 
     def _field(self, group: ParameterGroup, index: int) -> NumberField:
         item = group.parameters[index]
-        take = partial(self._set_number, group.name, index)
-        name = self._text.render(item.label)
-        return NumberField(self._text, name, item.unit, item.low, item.high, take, digits=None, widths=_WIDTHS)
+        name, unit = self._text.render(item.label), typed_scale(item)[1]
+
+        def take(number: float) -> None:
+            self._ask(SetControl(group=group.name, index=index, value=typed_value(item, number)))
+
+        return NumberField(self._text, name, unit, *typed_range(item), take, digits=None, widths=_WIDTHS)
 
     def _fill(self, group: ParameterGroup) -> None:
         numbers = shown_numbers(self._state.now.drive.control, group)
-        for field, number in zip(self.fields[group.name], numbers, strict=True):
-            field.show(number)
+        for field, number, item in zip(self.fields[group.name], numbers, group.parameters, strict=True):
+            field.show(typed_scale(item)[0] * number)
 
     def _button(self, code: str, act: Any) -> Any:
         button = shared_style_widget(

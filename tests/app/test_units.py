@@ -82,7 +82,15 @@ def test_a_sentence_inside_a_sentence_is_converted_once():
 
 @pytest.mark.parametrize(
     ("typed", "unit", "value"),
-    [("-0.5 rad", "deg", math.degrees(-0.5)), ("0.12 m", "mm", 120.0), ("12 mm", "mm", 12.0), ("30 °", "deg", 30.0)],
+    [
+        ("-0.5 rad", "deg", math.degrees(-0.5)),
+        ("0.12 m", "mm", 120.0),
+        ("12 mm", "mm", 12.0),
+        ("30 °", "deg", 30.0),
+        ("0.5 rad/s", "°/s", math.degrees(0.5)),
+        ("0.5 rad/s^2", "°/s²", math.degrees(0.5)),
+        ("0.1 m/s", "mm/s", 100.0),
+    ],
 )
 def test_a_number_counts_in_the_unit_typed_behind_it(typed, unit, value):
     assert parse_number(typed, -170.0, 170.0, unit).value == pytest.approx(value, abs=1e-12)
@@ -92,11 +100,15 @@ def test_a_number_out_of_range_is_answered_in_the_units_of_the_page():
     problem = parse_number("9 rad", -170.0, 170.0, "deg").problem
     assert problem is not None
     assert Text("en", SI).render(problem) == "9 rad is outside -2.97 rad to 2.97 rad and is not used."
+    problem = parse_number("9 rad/s", 0.0, 180.0, "°/s").problem
+    assert problem is not None
+    assert Text("en", SI).render(problem) == "9 rad/s is outside 0 rad/s to 3.142 rad/s and is not used."
 
 
 def test_what_is_typed_without_a_unit_counts_in_that_of_the_page():
     assert SI.unit("deg").complete("-0.25") == "-0.25 rad"
     assert SI.unit("deg").complete("20 deg") == "20 deg"
+    assert (SI.unit("°/s²").complete("3"), SI.unit("°/s²").complete("3 °/s^2")) == ("3 rad/s²", "3 °/s^2")
     assert Units().unit("deg").complete("-0.25") == "-0.25"
 
 

@@ -12,7 +12,16 @@ from rcilab.app.goal.goal_actions import MoveJoint, PoseGoal, SetLaw, SetSpeed
 from rcilab.app.request import TypeField
 from rcilab.app.run.drive_state import control_field
 from rcilab.app.run.mode_actions import PressControl, SetDrive
-from rcilab.app.run.mode_parameters import find_group, format_ranges, name_group, name_parameter
+from rcilab.app.run.mode_parameters import (
+    find_group,
+    format_ranges,
+    held_rows,
+    name_group,
+    name_parameter,
+    typed_range,
+    typed_scale,
+    typed_value,
+)
 from rcilab.app.run.played_motion import played_path
 from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.run_actions import RobotCommand
@@ -20,9 +29,11 @@ from rcilab.app.run.target_robot_actions import ChooseDestination
 from rcilab.app.run.world_actions import PressSafety, SetNetwork
 from rcilab.app.text import Text
 from rcilab.app.view_actions import ShowPlot
+from rcilab.control_process import SupervisorStatus
 from rcilab.control_process.jitter_histogram import JitterHistogram, summarise
 from rcilab.core.state import MODES
 from rcilab.i18n.catalogue import load_ui_catalogue
+from rcilab.i18n.units import SI
 from rcilab.makers.maker import parameters_of
 from rcilab.makers.parameters import default_parameters
 from rcilab.makers.rokae.controller.settings import Settings
@@ -116,6 +127,28 @@ def test_every_part_says_its_unit_and_range_and_has_its_words():
         "report_filter",
     ]
     assert [group.name for group in groups if group.is_first] == ["joint_stiffness", "cartesian_stiffness"]
+
+
+def test_speeds_are_shown_and_typed_in_the_units_of_the_page():
+    groups, text = parameters_of(load_model("RM75")), Text("en", maker="realman")
+    speeds = find_group(groups, "joint_velocity")
+    assert name_group(text, speeds) == "Largest speeds of the joints [0.5…180, 225 °/s]"
+    assert (
+        name_group(Text("en", SI, "realman"), speeds) == "Largest speeds of the joints [0.0087266…3.1416, 3.927 rad/s]"
+    )
+    assert (typed_range(speeds.parameters[0]), typed_scale(speeds.parameters[0])[1]) == ((0.5, 180.0), "°/s")
+    assert typed_value(speeds.parameters[0], 180.0) == speeds.parameters[0].high
+
+
+def test_a_group_of_different_quantities_names_each_of_them_with_its_unit():
+    groups, text = parameters_of(load_model("RM75")), Text("en", maker="realman")
+    tool = find_group(groups, "tool_limits")
+    rows = dict(held_rows(groups, None, SupervisorStatus(), text, is_known=True))
+    assert rows["Limits of the tool"] == (
+        "Speed 250 mm/s; Acceleration 1600 mm/s²; Rotation speed 34.377°/s; Rotation acceleration 229.18°/s²"
+    )
+    assert name_parameter(text, tool, 0) == "Speed [10…10000 mm/s]"
+    assert name_group(text, tool) == "Limits of the tool"
 
 
 @pytest.mark.parametrize("name", ["control.joint_stiffness.7", "control.sideways.0", "control.filters", "control"])

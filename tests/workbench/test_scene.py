@@ -319,7 +319,7 @@ def test_extras_are_computed_when_they_are_switched_on_and_gone_when_off(bench):
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_the_label_of_the_target_is_broken_into_lines(language: str) -> None:
     text = Text(language)
-    reason = text("reach.both", first=text("plan.here"), second=text("plan.watched"))
+    reason = text("joined", first=text("plan.here"), second=text("plan.watched"))
     lines = folded(reason).split("\n")
     assert len(lines) > 1
     assert max(len(line) for line in lines) <= 30

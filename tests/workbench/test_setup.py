@@ -371,6 +371,13 @@ def test_after_check_again_the_setup_tab_has_a_verdict_on_the_plan(bench, ask):
     assert panel._again.disabled
 
 
+def test_the_setup_tab_asks_for_no_goal(bench, ask):
+    ask(PoseGoal(name="here"))
+    panel = next(panel for panel in bench.renderer._panels if isinstance(panel, SetupPanel))
+    wait(lambda: getattr(bench.store.state.no_plan, "code", "") == "plan.here", "no plan")
+    wait(lambda: panel._planned._shown == "", "nothing about it")
+
+
 def test_a_robot_that_is_not_ours_is_changed_only_after_a_second_yes(bench, ask):
     controller = start_controller("xMatePro7")
     try:

@@ -11,7 +11,15 @@ from rcilab.app.app_state import AppState
 from rcilab.app.connection import Connection
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.run.drive_state import choose_mode, control_field, is_pending
-from rcilab.app.run.mode_parameters import CONFIRM_TIMEOUT, ask_to_send, find_group, with_number
+from rcilab.app.run.mode_parameters import (
+    CONFIRM_TIMEOUT,
+    ask_to_send,
+    find_group,
+    typed_range,
+    typed_scale,
+    typed_value,
+    with_number,
+)
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.requested_speed import RequestedSpeed, describe_override_refusal, is_running
 from rcilab.app.setup.configuration_sender import ConfigurationSender
@@ -59,6 +67,7 @@ class SetControl(Request):
     index: int
     """Index in the group."""
     value: float
+    """In the unit of the parameter."""
 
 
 class ModeActions:
@@ -123,14 +132,14 @@ class ModeActions:
         if found is None:
             return
         group, index = found
-        bounds = group.parameters[index]
-        parsed = parse_number(request.text, bounds.low, bounds.high, bounds.unit)
+        item = group.parameters[index]
+        parsed = parse_number(request.text, *typed_range(item), typed_scale(item)[1])
         if parsed.value is None:
             assert parsed.problem is not None
             self._store.set_problem(request.field, parsed.problem)
             return
         self._store.clear_problems(request.field)
-        self.set_control(SetControl(group=group.name, index=index, value=parsed.value))
+        self.set_control(SetControl(group=group.name, index=index, value=typed_value(item, parsed.value)))
 
     def set_control(self, request: SetControl) -> None:
         """Changes a parameter; an earlier refusal is dropped."""

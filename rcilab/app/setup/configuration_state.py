@@ -122,7 +122,7 @@ def goal_verdict(state: UiState) -> tuple[Tone, Message]:
     if outside is None or reach.tone == "bad":
         return reach.tone, reach.reason
     sentence = replace(outside, code="reach.outside")
-    return "warn", sentence if reach.tone == "good" else message("reach.both", first=reach.reason, second=sentence)
+    return "warn", sentence if reach.tone == "good" else message("joined", first=reach.reason, second=sentence)
 
 
 def name_parts(parts: tuple[str, ...]) -> Message:
@@ -155,12 +155,11 @@ def describe_part(setup: RobotConfiguration, part: str) -> Message:
 
 
 def describe_held(status: SupervisorStatus, part: str) -> Message:
-    """Returns the controller's values: tool and load as it reports them, all others as it acknowledged them."""
+    """Returns the controller's values as it reports them, or else as it acknowledged them."""
     if part == "tool" and status.T_flange_tool is not None:
         return _describe_pose(status.T_flange_tool)
-    if part == "load" and status.load is not None:
-        return describe_part(RobotConfiguration(load=status.load), part)
-    return message("setup.own") if getattr(status.setup, part) is None else describe_part(status.setup, part)
+    found = next((held for held in (status.reported, status.setup) if getattr(held, part) is not None), None)
+    return message("setup.own") if found is None else describe_part(found, part)
 
 
 def describe_watched(status: SupervisorStatus, part: str) -> Message:

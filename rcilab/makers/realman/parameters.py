@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import radians
 
 from rcilab.core.state import MODES
 from rcilab.i18n.translator import Message, message
@@ -13,8 +14,8 @@ from rcilab.makers.realman.wire.units import speed_from_millirpm
 from rcilab.model.robot_model import RobotModel
 from rcilab.robots import describe_robot
 
-_SLOWEST = 0.01
-"""Of speeds and accelerations, [rad/s], [m/s] and so on; rcilab's own bound: zero would not move."""
+_SLOWEST = {"rad": radians(0.5), "m": 0.01}
+"""Of speeds and accelerations by their unit, [rad/s], [m/s] and so on; rcilab's own bound: zero would not move."""
 
 
 def parameter_groups(model: RobotModel) -> tuple[ParameterGroup, ...]:
@@ -52,4 +53,4 @@ def _joint_group(name: str, largest: Sequence[float], defaults: Sequence[float],
 
 
 def _number(label: Message, high: float, default: float, unit: str) -> Parameter:
-    return Parameter(label=label, low=_SLOWEST, high=high, default=default, unit=unit)
+    return Parameter(label=label, low=_SLOWEST[unit.partition("/")[0]], high=high, default=default, unit=unit)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.app.arm_features import explain_missing_feature, explain_missing_part, is_only_planned
 from rcilab.app.run.drive_state import is_pending
 from rcilab.app.run.mode_actions import PressControl, SetDrive
-from rcilab.app.run.mode_parameters import held_rows, name_group, name_parameter, shown_numbers
+from rcilab.app.run.mode_parameters import held_rows, name_group, name_parameter, shown_numbers, typed_scale
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.text import Text
 from rcilab.core.state import MODES, Mode
@@ -82,8 +82,10 @@ class ModePanel:
             folder, visible = self._folders[group.name], drive.mode in group.modes
             if folder.visible != visible:
                 folder.visible = visible
-            for field, number in zip(self._fields[group.name], shown_numbers(drive.control, group), strict=True):
-                field.show(f"{number:g}", state.problems.get(field.field), state.entered)
+            numbers = shown_numbers(drive.control, group)
+            for field, number, item in zip(self._fields[group.name], numbers, group.parameters, strict=True):
+                factor, _ = typed_scale(item)
+                field.show(f"{factor * number:g}", state.problems.get(field.field), state.entered)
             self._problems[group.name].show(problems_html(state, text, self._labels[group.name]))
         self._send.visible = state.target != "virtual"
         self._send.disabled = not is_pending(state, status) or status.phase != "idle"
@@ -94,18 +96,19 @@ class ModePanel:
 
     def _build_field(self, gui: Any, group: ParameterGroup, index: int, label: str) -> NumberField:
         handle = gui.add_text(label, "", hint=self._text("target.type_hint"))
-        return NumberField(handle, self._ask, f"control.{group.name}.{index}")
+        unit = self._text.unit(typed_scale(group.parameters[index])[1])
+        return NumberField(handle, self._ask, f"control.{group.name}.{index}", unit)
 
 
 def held_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
-    """Returns the controller's parameters of this mode, as it acknowledged them."""
+    """Returns the controller's parameters of this mode, as it has acknowledged or reported them."""
     if state.drive.refusal is not None:
         why = text.render(message("ready.control_refused", error=state.drive.refusal))
         return f'<p class="rl-problem" role="alert">{esc(why)}</p>'
     groups, is_known = parameters_of(state.model), state.target == "virtual"
     rows = "".join(
         f"<tr><th>{esc(name)}</th><td>{esc(shown)}</td></tr>"
-        for name, shown in held_rows(groups, state.drive.mode, status.setup.control, text, is_known=is_known)
+        for name, shown in held_rows(groups, state.drive.mode, status, text, is_known=is_known)
     )
     pending = f'<p class="rl-note rl-why">{esc(text("control.pending"))}</p>' if is_pending(state, status) else ""
     title = f'<p class="rl-note">{esc(text("control.held"))}</p>'

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 from rcilab.app.control_lock_actions import TakeControls
@@ -66,7 +67,8 @@ class SettingsPanel:
             allow_spectators(self._take)
         limits = state.model.limits
         sources = dict.fromkeys(limits.source(f"joint.{name}") for name in ("velocity", "acceleration"))
-        source = "; ".join(explain_limit(source, text.language) for source in sources)
+        named = (explain_limit(source, text.language) for source in sources)
+        source = reduce(lambda first, second: text("joined", first=first, second=second), named)
         gui.add_html(f'<p class="rl-note">{esc(text("settings.limits", source=source))}</p>')
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:

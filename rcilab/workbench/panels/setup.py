@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 from rcilab.app.arm_features import explain_missing_part
@@ -80,7 +81,8 @@ class SetupPanel:
         self._edited.show(self._choices[setup.edited])
         self._edited.handle.disabled = bool(state.watched)
         self._again.disabled = outdated(state) is None
-        self._planned.show(planned_html(state, status, text))
+        is_idle = state.no_plan is not None and state.no_plan.code == "plan.here"  # Says how to move, not here.
+        self._planned.show("" if is_idle else planned_html(state, status, text))
         self._table.show(self._table_html(state, status))
 
     def _verdict_html(self, state: UiState, status: SupervisorStatus) -> str:
@@ -91,7 +93,11 @@ class SetupPanel:
         obstacle = setup_obstacle(state, status)
         differing = differing_tool(state, status)
         if setup.asked is setup.wanted and pending:
-            parts = "; ".join(f"{text(f'setup.part.{part}')}: {self._said(setup.wanted, part)}" for part in pending)
+            named = (
+                text("setup.value", part=text(f"setup.part.{part}"), value=self._said(setup.wanted, part))
+                for part in pending
+            )
+            parts = reduce(lambda first, second: text("joined", first=first, second=second), named)
             sentence = text("setup.ask", model=state.model.name, address=state.target, what=parts)
             return f'<p class="rl-verdict rl-warn" role="alert">{esc(sentence)}</p>'
         if obstacle is not None:
@@ -139,13 +145,12 @@ class SetupPanel:
     def _parameter_rows(self, state: UiState, status: SupervisorStatus) -> list[str]:
         """Returns the parameters of all modes as the controller has them; Run has their fields."""
         groups, is_known = parameters_of(state.model), state.target == "virtual"
-        held = held_rows(groups, None, status.setup.control, self._text, is_known=is_known)
-        where = esc(self._text("setup.in_mode"))
-        return [
-            f"<tr><th>{esc(name)}</th><td>{esc(shown)}"
-            f'<br><span class="rl-dim">{esc(units_of(group))}<br>{where}</span></td></tr>'
-            for group, (name, shown) in zip(groups, held, strict=True)
-        ]
+        held = held_rows(groups, None, status, self._text, is_known=is_known)
+        where, rows = self._text("setup.in_mode"), []
+        for group, (name, shown) in zip(groups, held, strict=True):
+            notes = "<br>".join(esc(note) for note in (units_of(group, self._text.units), where) if note)
+            rows.append(f'<tr><th>{esc(name)}</th><td>{esc(shown)}<br><span class="rl-dim">{notes}</span></td></tr>')
+        return rows
 
     def _said(self, setup: Any, part: str) -> str:
         return self._text.render(describe_part(setup, part))

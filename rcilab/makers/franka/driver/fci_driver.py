@@ -28,7 +28,7 @@ from rcilab.makers.franka.driver.state_reader import StateReader
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.limit_tables import cartesian_limits, require_table
 from rcilab.makers.known_setup import with_reported_load, with_reported_tool
-from rcilab.model.dynamics.payload import Payload, combine_payloads
+from rcilab.model.dynamics.payload import combine_payloads
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
@@ -97,10 +97,9 @@ class FciDriver:
         self._shown = _IDLE
         self._latest = self._reader.read(client.newest, *_IDLE)
 
-    @property
-    def load(self) -> Payload:
-        """The load of `set_load`, without the end effector that is set in Desk."""
-        return self._settings.load
+    def read_configuration(self) -> RobotConfiguration:
+        """Returns the load of `set_load`, without the end effector that is set in Desk."""
+        return RobotConfiguration(load=self._settings.load)
 
     @property
     def latest(self) -> RobotState | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import radians
 from typing import TYPE_CHECKING, Any
 
@@ -30,7 +31,6 @@ from rcilab.makers.realman.wire.units import degrees_for_client
 from rcilab.robots import describe_robot
 
 if TYPE_CHECKING:
-    from rcilab.model.dynamics.payload import Payload
     from rcilab.model.robot_model import RobotModel
 
 _SWITCHED = 5.0  # [s] For the joints to show that they are enabled or not.
@@ -98,10 +98,9 @@ class RealManDriver(LibraryDriver[NumberedPush]):
         self._link = connection
         self._settings: RealManSettings = RealManSettings(connection, arm_name)
 
-    @property
-    def load(self) -> Payload:
-        """The load of the tool frame that is set, as read last."""
-        return self._settings.tool.load
+    def read_configuration(self) -> RobotConfiguration:
+        """Returns the load of the tool frame that is set, and the limits in force of joints and tool."""
+        return replace(self._settings.read_limits(), load=self._settings.tool.load)
 
     def open_commands(self, arm: ConfiguredArm, lock: RequestLock) -> RealManSessionCommands:
         """Returns the commands of the interface for a session; its model has the controller's limits from now on."""

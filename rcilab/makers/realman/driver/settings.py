@@ -19,7 +19,7 @@ from rcilab.core.arrays import Array, described, readonly_copy
 from rcilab.core.errors import CommandRejectedError, ControlError, InvalidValueError, RcilabError
 from rcilab.core.fault import FaultCode
 from rcilab.core.spatial import IDENTITY, Pose, as_pose
-from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, tool_limits_of
+from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, SoftJointLimits, tool_limits_of
 from rcilab.makers.driver import require_signal
 from rcilab.makers.realman.bounds import (
     ANGLE_STEP,
@@ -274,21 +274,37 @@ class RealManSettings:
         with self._request("read_input"):
             return bool(self._call(self.api.rm_get_io_input)[number])
 
-    def with_limits(self, model: RobotModel) -> RobotModel:
-        """Returns the model with the limits in force in the controller; its ranges are not wider than before."""
-        api, joint = self.api, model.limits.joint
-        with self._request("with_limits"):
+    def read_limits(self) -> RobotConfiguration:
+        """Returns the limits in force in the controller: ranges, speeds and accelerations of joints and tool."""
+        api = self.api
+        with self._request("read_limits"):
             velocity = self._stricter(np.minimum, api.rm_get_joint_max_speed, api.rm_get_joint_drive_max_speed)
             acceleration = self._stricter(np.minimum, api.rm_get_joint_max_acc, api.rm_get_joint_drive_max_acc)
             low = self._stricter(np.maximum, api.rm_get_joint_min_pos, api.rm_get_joint_drive_min_pos)
             high = self._stricter(np.minimum, api.rm_get_joint_max_pos, api.rm_get_joint_drive_max_pos)
             tool = [self._call(getattr(api, f"rm_get_arm_max_{name}")) for name in _TOOL_LIMITS]
+            stage = self._call(api.rm_get_collision_stage)
         control = ControllerParameters(
-            joint_velocity=_snapped(velocity, joint.velocity),
-            joint_acceleration=_snapped(acceleration, joint.acceleration),
-            tool_limits=_snapped(tool, tool_limits_of(model.limits)),
+            joint_velocity=tuple(velocity.tolist()),
+            joint_acceleration=tuple(acceleration.tolist()),
+            tool_limits=tuple(tool),
+            collision_stage=(float(stage),),
+        )
+        joints = SoftJointLimits(lower=tuple(low.tolist()), upper=tuple(high.tolist()))
+        return RobotConfiguration(joints=joints, control=control)
+
+    def with_limits(self, model: RobotModel) -> RobotModel:
+        """Returns the model with the limits in force in the controller; its ranges are not wider than before."""
+        found, joint = self.read_limits(), model.limits.joint
+        assert found.joints is not None
+        assert found.control is not None
+        control = ControllerParameters(
+            joint_velocity=_snapped(found.control["joint_velocity"], joint.velocity),
+            joint_acceleration=_snapped(found.control["joint_acceleration"], joint.acceleration),
+            tool_limits=_snapped(found.control["tool_limits"], tool_limits_of(model.limits)),
         )
         limited = RobotConfiguration(control=control).applied_to(model)
+        low, high = np.array(found.joints.lower), np.array(found.joints.upper)
         lower, upper = np.maximum(joint.lower, low - _STEP), np.minimum(joint.upper, high + _STEP)
         if np.array_equal(lower, joint.lower) and np.array_equal(upper, joint.upper):
             return limited

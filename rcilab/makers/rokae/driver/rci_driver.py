@@ -99,10 +99,9 @@ class RciDriver:
         self._mode = ControllerMode.JOINT_POSITION
         self._shown = MotionGeneratorMode.IDLE
 
-    @property
-    def load(self) -> None:
-        """None: the interface does not report it."""
-        return None
+    def read_configuration(self) -> RobotConfiguration:
+        """Returns nothing: the interface does not report it."""
+        return RobotConfiguration()
 
     @property
     def latest(self) -> RobotState | None:

@@ -28,7 +28,6 @@ from rcilab.makers.ufactory.driver.state_reader import MOVING, READY, READY_MODE
 from rcilab.robots import describe_robot
 
 if TYPE_CHECKING:
-    from rcilab.model.dynamics.payload import Payload
     from rcilab.model.robot_model import RobotModel
 
 _SWITCHED = 2.0  # [s] For the motors to show that they are on or off; brakes take 0.2 s.
@@ -87,10 +86,9 @@ class XArmDriver(LibraryDriver[bytes]):
         self._link = connection
         self._settings = XArmSettings(connection, arm_name)
 
-    @property
-    def load(self) -> Payload:
-        """The load that is set."""
-        return self._settings.load
+    def read_configuration(self) -> RobotConfiguration:
+        """Returns the load that is set."""
+        return RobotConfiguration(load=self._settings.load)
 
     def open_commands(self, arm: ConfiguredArm, lock: RequestLock) -> XArmSessionCommands:
         """Returns the commands of the interface for a session."""

@@ -7,11 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from rcilab.app.setup.configuration_state import describe_held
+from rcilab.app.text import Text
 from rcilab.conformance.check import check
 from rcilab.control_process import Supervisor
 from rcilab.core.errors import ControlError
 from rcilab.execution.simulation_control import SimulationControl
-from rcilab.makers.configuration import ControllerParameters, RobotConfiguration
+from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, SoftJointLimits
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
 from tests.waiting import SOON, wait_for
@@ -64,6 +66,20 @@ def test_limits_that_are_set_are_those_of_its_arm(supervisor):
     supervisor.configure(RobotConfiguration(control=ControllerParameters(joint_velocity=slower))).wait(SOON)
     assert np.array_equal(supervisor.model.limits.joint.velocity, slower)
     begin(supervisor, 0.1, speed=0.3)[1].wait(SOON)
+
+
+def test_the_ranges_and_limits_that_the_controller_reports_are_shown(supervisor):
+    def held(part):
+        return Text("en").render(describe_held(supervisor.status(), part))
+
+    assert held("joints").startswith("-178")
+    own = supervisor.model.limits.joint
+    upper = (1.0, *own.upper[1:].tolist())
+    supervisor.configure(RobotConfiguration(joints=SoftJointLimits(lower=tuple(own.lower), upper=upper))).wait(SOON)
+    assert held("joints").startswith("-178…57,")
+    control = supervisor.status().reported.control
+    assert control["tool_limits"] == pytest.approx((0.25, 1.6, 0.6, 4.0))
+    assert control["joint_acceleration"] == pytest.approx(own.acceleration.tolist(), rel=1e-3)
 
 
 def test_an_emergency_stop_is_shown_until_its_release(supervisor):
