@@ -33,6 +33,17 @@ _LANES = {
     "deadlines": ("control_process/", "workbench/", "execution/test_virtual.py", "cli/test_bench.py"),
 }
 """Name of each lane and the files in it, those that draw in a browser and those that keep real deadlines."""
+_LONG = (
+    "notebook/test_lessons.py",
+    "peers/test_start_of_motion.py",
+    "makers/realman/test_scenarios.py",
+    "makers/ufactory/clients/test_sdk.py",
+    "app/fault_lab/test_fault_lab.py",
+    "makers/ufactory/test_scenarios.py",
+    "makers/realman/clients/test_robotic_arm.py",
+    "model/kinematics/test_numeric.py",
+)
+"""Other files that take half a minute and more; the last ones to begin would keep one core busy alone."""
 
 
 def lane_of(file: str) -> str | None:
@@ -54,9 +65,9 @@ def pytest_itemcollected(item: pytest.Item) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Puts the lanes first: they take longest (`--no-loadscope-reorder`)."""
-    lanes = [*_LANES]
-    items.sort(key=lambda item: lanes.index(group) if (group := group_of(item)) in _LANES else len(lanes))
+    """Puts the groups first that take longest (`--no-loadscope-reorder`)."""
+    first = [*_LANES, *_LONG]
+    items.sort(key=lambda item: first.index(group) if (group := group_of(item)) in first else len(first))
 
 
 @pytest.fixture

@@ -276,8 +276,9 @@ class ArmServer:
                 self._timer.restart(self._clock.now())
             else:
                 due = self._timer.next(self._clock.now())
-                if not (self._is_idle and has_served):
-                    self._serve_until(due - (CYCLE_TIME if self._is_idle else LEAD_TIME))
+                is_idle = self._is_idle
+                if not (is_idle and has_served):
+                    self._serve_until(due - (CYCLE_TIME if is_idle else LEAD_TIME))
                 if self._patience > 0.0:
                     self._await_late_command()
                 elif self._timer.postpones(self.controller.is_starved):

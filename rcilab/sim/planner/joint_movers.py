@@ -160,6 +160,7 @@ class StreamMover:
         self._is_off = False  # Whether it approaches the angles to follow.
         self._before = list(state.q)  # What was to be followed in the cycle before.
         self._past: list[list[float]] = []  # The last angles, the newest first, while they are smoothed.
+        self._is_stationary: bool | None = None  # None: not known yet. Asked for many times a cycle.
 
     @property
     def state(self) -> MotionState:
@@ -169,8 +170,11 @@ class StreamMover:
     @property
     def is_stationary(self) -> bool:
         """Whether the arm stands at the newest angles."""
-        is_there = max(abs(a - b) for a, b in zip(self._axes.q, self.target, strict=True)) < _THERE
-        return is_there and self._filter.is_settled and _stands(self._axes)
+        if self._is_stationary is None:
+            axes = self._axes
+            is_there = all(abs(a - b) < _THERE for a, b in zip(axes.q, self.target, strict=True))
+            self._is_stationary = is_there and self._filter.is_settled and _stands(axes)
+        return self._is_stationary
 
     def take(self, q: list[float], speed: JointSpeed, mode: StreamMode, smoothing: float) -> None:
         """Takes the newest angles, n finite numbers, [rad].
@@ -191,11 +195,13 @@ class StreamMover:
         self._velocity = joint_bounds(self._limits, speed).velocity.tolist()
         self.target = q
         self._filter.take(q)
+        self._is_stationary = None
 
     def step(self) -> list[float]:
         """Advances one cycle and returns the joint angles, n plain floats, [rad]."""
         if self._filter.mode in ("direct", "linear") and self.is_stationary:
             return list(self._axes.q)
+        self._is_stationary = None
         q = self._filter.step()
         if self._filter.mode == "linear":
             if not self._stays_on_line(q, self._filter.velocity):

@@ -39,6 +39,7 @@ from rcilab.sim.self_collision import SelfCollisionWatch
 from rcilab.sim.violations import describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 
+_PHASES = {PlannerState.IDLE: "idle", PlannerState.MOVING: "moving", PlannerState.PAUSED: "paused"}
 _ESTOP = Remark("the emergency stop was pressed", "estop")
 
 
@@ -146,12 +147,15 @@ class RealManController:
     @property
     def phase_name(self) -> str:
         """What it does: "idle", "moving", "paused" or "fault"."""
-        if any(word & ~RealManError.JOINT_POSITION_STEP.code for word in self.joint_errors) or any(
-            error not in REFUSED_COMMANDS for error in self.system_errors
-        ):
-            return "fault"
-        state = self.drive.planner.state
-        return {PlannerState.IDLE: "idle", PlannerState.MOVING: "moving", PlannerState.PAUSED: "paused"}[state]
+        return "fault" if self._has_fault else _PHASES[self.drive.planner.state]
+
+    @property
+    def _has_fault(self) -> bool:
+        """Whether an error is set that stopped the arm."""
+        joints, system = self.joint_errors, self.system_errors
+        return (any(joints) and any(word & ~RealManError.JOINT_POSITION_STEP.code for word in joints)) or any(
+            error not in REFUSED_COMMANDS for error in system
+        )
 
     @property
     def faults(self) -> tuple[RealManError, ...]:
@@ -391,7 +395,7 @@ class RealManController:
         self._check_surroundings()
         for event in self.drive.events:
             self._handle(event.id, event.kind, event.refusal)
-        if self.drive.is_still or self.drive.planner.state is PlannerState.MOVING:
+        if self._arrived and (self.drive.is_still or self.drive.planner.state is PlannerState.MOVING):
             self._report_arrivals()
         if self.streamed and self.drive.is_still:
             self.streamed = ""
@@ -503,6 +507,6 @@ class RealManController:
     def _robot_mode(self, is_moving: bool) -> RobotMode:
         if self.button != "none":
             return RobotMode.USER_STOPPED
-        if self.phase_name == "fault":
+        if self._has_fault:
             return RobotMode.REFLEX
         return RobotMode.MOVE if is_moving else RobotMode.IDLE

@@ -31,13 +31,14 @@ def build_neutral_state(controller: XArmController) -> RobotState:
     q_c, dq_c, ddq_c = commanded.arrays
     rates = make_readonly(np.array([*tool_c.twist, *tool_c.acceleration]))
     shown = controller.shown_state
+    is_moving = controller.is_moving
     zeros = np.zeros(len(q_c))
     if controller.error is not None:
         robot_mode = RobotMode.REFLEX
     elif controller.mode is Mode.TEACH and shown is State.READY:
         robot_mode = RobotMode.GUIDING
     else:
-        robot_mode = RobotMode.MOVE if controller.is_moving else RobotMode.IDLE
+        robot_mode = RobotMode.MOVE if is_moving else RobotMode.IDLE
     return build_state(
         (
             controller.cycle_number,
@@ -66,8 +67,8 @@ def build_neutral_state(controller: XArmController) -> RobotState:
             measured.tau,
             controller.faults,
             1.0,
-            _GENERATORS[controller.mode] if controller.is_moving else MotionGeneratorMode.IDLE,
-            ControllerMode.JOINT_POSITION if controller.is_moving else ControllerMode.OTHER,
+            _GENERATORS[controller.mode] if is_moving else MotionGeneratorMode.IDLE,
+            ControllerMode.JOINT_POSITION if is_moving else ControllerMode.OTHER,
             robot_mode,
         )
     )

@@ -464,8 +464,8 @@ class XArmController:
             self._watch()
         if self._set_state is State.STOPPING and self.planner.state is not PlannerState.MOVING:
             self._set_state = State.STOPPED
-        if self._shown_state is not self.shown_state:
-            before, self._shown_state = self._shown_state, self.shown_state
+        before, self._shown_state = self._shown_state, self.shown_state
+        if before is not self._shown_state:
             self.on_state(before, self._shown_state)
         self.robot_state = build_neutral_state(self)
         return self.robot_state
