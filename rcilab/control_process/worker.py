@@ -106,6 +106,8 @@ class ControlProcess:
             np.zeros(self._settings.arm.n),
         )  # The first call loads the planner; the next one must be fast.
         self._model.rigid_body.gravity(self._model.home)  # The first call loads the library: seconds from a cold disk.
+        gc.collect()
+        gc.freeze()  # The collection after a motion scans only what is newer.
         granted = enter_realtime(PRIORITY)
         self._status.update(is_fifo=granted.policy == "SCHED_FIFO", memory_locked=granted.memory_locked)
         if granted.warning:

@@ -1,8 +1,9 @@
-"""The recorder of cycles: one fixed-size row per cycle in preallocated memory."""
+"""The recorder of cycles: one fixed-size row per cycle in reserved memory."""
 
 from __future__ import annotations
 
 import math
+import mmap
 import struct
 from collections.abc import Sequence
 
@@ -30,7 +31,7 @@ class Recorder:
         self,
         n: int,
         capacity: int = round(RECORD_TIME / CYCLE_TIME),
-        buffer: memoryview | bytearray | None = None,
+        buffer: memoryview | bytearray | mmap.mmap | None = None,
         *,
         complete: bool = False,
     ) -> None:
@@ -41,7 +42,7 @@ class Recorder:
         self.count = 0
         """Number of rows written; the newest is number `count - 1`."""
         self._size = dtype.itemsize
-        memory = bytearray(capacity * self._size) if buffer is None else buffer
+        memory = _reserve(capacity * self._size) if buffer is None else buffer
         self._memory = memory
         self._rows: NDArray[np.void] = np.frombuffer(memory, dtype=dtype, count=capacity)
         start = f"<Qdqqdd{4 * n}dQIBBBB{2 * n + 17}d"
@@ -117,3 +118,10 @@ class Recorder:
     def last(self, count: int) -> NDArray[np.void]:
         """Returns a copy of the newest rows, at most `count`, oldest first."""
         return self.rows(self.count - count)
+
+
+def _reserve(size: int) -> mmap.mmap:
+    """Returns memory whose pages cost nothing until they are written, each less than a microsecond then."""
+    memory = mmap.mmap(-1, size)
+    memory.madvise(mmap.MADV_NOHUGEPAGE)  # To clear a huge one takes a part of the cycle.
+    return memory

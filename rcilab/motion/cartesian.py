@@ -240,7 +240,8 @@ def arm_angles(
 
     Raises:
         PlanningError: The arm angle has no meaning at the start.
-        InvalidValueError: `psi` is not within +-pi, or the arm has no arm angle.
+        InvalidValueError: `psi` is not within +-pi, or not in the range of the joint whose angle it is; or the arm has
+            no arm angle.
     """
     if not model.redundancy:
         if psi is not None:
@@ -255,6 +256,12 @@ def arm_angles(
     requested = current if psi is None else as_number(psi, "psi", "rad")
     if not abs(requested) <= math.pi:
         raise InvalidValueError("psi", psi, "must be from -pi to pi [rad]").coded("span", low="-pi", high="pi")
+    joint = model.redundancy.joint
+    if joint is not None:
+        low, high = (float(bound[joint - 1]) for bound in (model.limits.joint.lower, model.limits.joint.upper))
+        if not low <= requested <= high:
+            problem = f"is the angle of joint {joint} and must be from {low:g} to {high:g} [rad]"
+            raise InvalidValueError("psi", psi, problem).coded("span", low=f"{low:g}", high=f"{high:g}")
     if way is None or psi is None:
         return current, requested
     shorter = math.remainder(requested - current, math.tau)

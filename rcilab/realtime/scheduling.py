@@ -45,14 +45,12 @@ class Scheduling:
 def enter_realtime(priority: int) -> Scheduling:
     """Requests SCHED_FIFO, locked memory and a disabled garbage collector for this process; returns what was granted.
 
-    Existing garbage is collected first, the remaining objects are frozen. Reference counting continues, so a loop that
-    creates no reference cycles does not grow. Child processes start with ordinary scheduling.
+    Reference counting continues, so a loop that creates no reference cycles does not grow. Child processes start with
+    ordinary scheduling.
 
     Args:
         priority: Priority under SCHED_FIFO, 1 to 99.
     """
-    gc.collect()
-    gc.freeze()
     gc.disable()
     is_first = _enter_fifo(priority)
     is_locked = _lock_memory()
@@ -69,7 +67,6 @@ def leave_realtime() -> None:
     if os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     ctypes.CDLL(None).munlockall()
-    gc.unfreeze()
     gc.enable()
 
 

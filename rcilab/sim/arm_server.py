@@ -605,4 +605,5 @@ def _shortened(reason: Remark) -> str:
     """Returns the first violations of a cycle and the number of the others: a jump violates limits of every joint."""
     parts = reason.parts
     shown = "; ".join(parts[:_MOST_VIOLATIONS])
-    return shown if len(parts) <= _MOST_VIOLATIONS else f"{shown}; and {len(parts) - _MOST_VIOLATIONS} more violations"
+    more = len(parts) - _MOST_VIOLATIONS
+    return shown if more <= 0 else f"{shown}; and {more} more violation{'s' if more > 1 else ''}"

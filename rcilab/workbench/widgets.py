@@ -204,6 +204,11 @@ def esc(text: object) -> str:
     return html.escape(str(text))
 
 
+def esc_names(text: object) -> str:
+    """Returns `text` for HTML; the long names of faults in it may break after each underscore."""
+    return esc(text).replace("_", "_<wbr>")
+
+
 def shown(number: float) -> str:
     """Returns a number for a field: two decimals, and never "-0.00"."""
     return format_fixed(float(number), 2)

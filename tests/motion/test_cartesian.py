@@ -9,7 +9,7 @@ import pytest
 
 import rcilab
 from rcilab.conformance.check import check
-from rcilab.core.errors import InvalidValueError, PlanningError
+from rcilab.core.errors import InvalidValueError, PlanningError, UnreachableError
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_arc, plan_circle, plan_line, plan_nullspace
@@ -124,6 +124,21 @@ def test_a_bad_argument_is_named(options, hint):
     arguments = {"start": SEVEN.home, "goal": moved(SEVEN, (0.1, 0.0, 0.0)), **options}
     with pytest.raises(InvalidValueError, match=hint):
         plan_line(SEVEN, arguments.pop("start"), arguments.pop("goal"), **arguments)
+
+
+def test_the_angle_of_a_joint_as_arm_angle_is_inside_its_range():
+    fr3 = load_model("FR3")
+    with pytest.raises(
+        InvalidValueError, match=r"psi: 2\.95 is the angle of joint 3 and must be from -2\.9065 to 2\.9065"
+    ):
+        plan_line(fr3, fr3.home, fr3.forward(fr3.home), psi=2.95)
+
+
+def test_a_pose_that_is_hardly_out_of_reach_is_said_to_be():
+    stretched = SEVEN.forward(np.zeros(7))
+    away = Pose(stretched.position + [0.0, 0.0, 2e-5], stretched.wxyz)
+    with pytest.raises(UnreachableError, match=r"out of reach by less than 0\.1 mm"):
+        SEVEN.inverse(away, 0.0)
 
 
 def test_an_arm_angle_is_refused_for_six_axes_and_a_start_outside_the_limits_for_all():

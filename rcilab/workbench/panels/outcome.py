@@ -13,7 +13,7 @@ from rcilab.core.fault import name_faults
 from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.translator import Remark
 from rcilab.recording.html_facts import describe_goal, describe_stop
-from rcilab.workbench.widgets import esc
+from rcilab.workbench.widgets import esc, esc_names
 
 if TYPE_CHECKING:
     from rcilab.app.run.recording import Recording
@@ -59,7 +59,7 @@ def outcome_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     last = "" if recording is state.recording else esc(text("record.last")) + " "
     finding = recording.finding or _reported_stop(recording.run)
     finding = finding and f"<br>{esc(text.render(describe_note(finding)))}"
-    return f'<p class="rl-verdict rl-{tone}">{last}<b>{esc(ended)}</b> {esc(facts)}{finding or ""}</p>'
+    return f'<p class="rl-verdict rl-{tone}">{last}<b>{esc_names(ended)}</b> {esc(facts)}{finding or ""}</p>'
 
 
 def replay_html(state: UiState, status: SupervisorStatus, text: Text) -> str:

@@ -29,7 +29,7 @@ from rcilab.motion.speed_scaling import MIN_SPEED_OVERRIDE
 from rcilab.sim.api import WorldStatus
 from rcilab.workbench.panels.outcome import outcome_html, progress_html
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press, why_html
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, esc_names, on_press, why_html
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -153,13 +153,13 @@ def faults_html(status: SupervisorStatus, text: Text, world: WorldStatus | None)
     if (
         status.is_pressed or was_stop or status.code == "fault.released"
     ):  # A safety stop sets one of several bits, whose usual texts would mislead.
-        names = esc(name_faults(status.faults))
+        names = esc_names(name_faults(status.faults))
         sentence = (
             f'<div class="rl-facts">{esc(text("fault.by_stop" if status.is_pressed else "fault.was_stop"))}</div>'
         )
         return names and f'<div class="rl-card rl-bad"><div class="rl-line"><b>{names}</b></div>{sentence}</div>'
     return "".join(
-        f'<div class="rl-card rl-bad"><div class="rl-line"><b>{esc(fault.manual_name)}</b></div>'
+        f'<div class="rl-card rl-bad"><div class="rl-line"><b>{esc_names(fault.manual_name)}</b></div>'
         f'<div class="rl-facts">{esc(text(f"fault.{fault.key}"))}</div>'
         f'<div class="rl-source">{esc(describe_remedy(fault, text))}</div></div>'
         for fault in status.faults

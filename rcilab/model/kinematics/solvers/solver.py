@@ -19,6 +19,11 @@ REACH_TOLERANCE = 1e-9  # [m] A pose out of reach by less, because of rounding, 
 _FAR = 10.0  # [m] A target farther away is probably one in mm.
 
 
+def describe_excess(distance: float) -> str:
+    """Returns by how much a pose is out of reach, for its error; `distance` in [m]."""
+    return f"{1e3 * distance:.1f} mm" if distance >= 5e-5 else "less than 0.1 mm"
+
+
 def unit_hint(distance: float) -> str:
     """Returns what to add to the error of a pose that is out of reach by a distance, [m]."""
     return "; positions are in m" if distance > _FAR else ""

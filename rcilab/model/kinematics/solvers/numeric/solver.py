@@ -26,6 +26,7 @@ from rcilab.model.kinematics.solvers.solver import (
     Envelope,
     PoseSolver,
     Redundancy,
+    describe_excess,
     unit_hint,
 )
 from rcilab.robots.description import RobotDescription
@@ -175,7 +176,7 @@ def require_reach(envelope: Envelope, pose: Pose) -> None:
     length = hypot(x - hand * r[2], y - hand * r[5], z - hand * r[8] - envelope.shoulder)
     if length > max_length + REACH_TOLERANCE:
         raise UnreachableError(
-            f"out of reach by {1e3 * (length - max_length):.1f} mm: the wrist centre would be {length:.3f} m from the "
-            f"shoulder, the arm reaches {max_length:.3f} m at most; move the target closer{unit_hint(length)}",
+            f"out of reach by {describe_excess(length - max_length)}: the wrist centre would be {length:.3f} m from "
+            f"the shoulder, the arm reaches {max_length:.3f} m at most; move the target closer{unit_hint(length)}",
             distance=length - max_length,
         ).coded("too_far", distance=length - max_length)

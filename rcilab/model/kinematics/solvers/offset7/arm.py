@@ -22,7 +22,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.errors import ModelError, UnreachableError
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.forward import Chain, build_chain
-from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE, unit_hint
+from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE, describe_excess, unit_hint
 from rcilab.robots.description import DhRow, RobotDescription
 
 ELBOW = 2
@@ -281,7 +281,7 @@ def _unreachable(arm: OffsetGeometry, beyond: Array) -> UnreachableError:
             "orientation; turn the tool or move the target"
         )
     return UnreachableError(
-        f"out of reach by {1e3 * excess:.1f} mm: the wrist has to be {shortest:.3f} to {longest:.3f} m from the "
+        f"out of reach by {describe_excess(excess)}: the wrist has to be {shortest:.3f} to {longest:.3f} m from the "
         f"shoulder, at any angle of joint 7; move the target{unit_hint(excess)}",
         distance=excess,
     )

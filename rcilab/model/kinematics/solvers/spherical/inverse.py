@@ -19,7 +19,7 @@ from math import atan2, cos, hypot, pi, sin, sqrt, tau
 from rcilab.core.errors import ModelError, SingularError, UnreachableError
 from rcilab.core.spatial import Pose, Rotation9
 from rcilab.model.kinematics.arm_angle import reference_frame
-from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE, Angles, unit_hint
+from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE, Angles, describe_excess, unit_hint
 from rcilab.robots.description import DhRow, RobotDescription
 
 _AXIS_LOST = 1e-12  # sin of an angle below which the axes before and after it are parallel within rounding.
@@ -205,12 +205,12 @@ def reach_error(arm: ArmGeometry, length: float) -> UnreachableError:
     longest, shortest = arm.upper + arm.fore, abs(arm.upper - arm.fore)
     if length > longest:
         return UnreachableError(
-            f"out of reach by {1e3 * (length - longest):.1f} mm: the wrist centre would be {length:.3f} m from the "
+            f"out of reach by {describe_excess(length - longest)}: the wrist centre would be {length:.3f} m from the "
             f"shoulder, the arm reaches {longest:.3f} m; move the target closer{unit_hint(length)}",
             distance=length - longest,
         ).coded("too_far", distance=length - longest)
     return UnreachableError(
-        f"too close by {1e3 * (shortest - length):.1f} mm: the wrist centre would be {length:.3f} m from the "
+        f"too close by {describe_excess(shortest - length)}: the wrist centre would be {length:.3f} m from the "
         f"shoulder, the folded arm keeps {shortest:.3f} m; move the target away",
         distance=shortest - length,
     ).coded("too_close", distance=shortest - length)
