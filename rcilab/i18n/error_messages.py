@@ -51,7 +51,8 @@ def describe_note(note: str) -> Message | LiteralText:
         name: describe_note(fact) if isinstance(fact, Remark) else fact for name, fact in note.facts.items()
     }
     if "unit" in facts:
-        value, bound, unit = float(facts["value"]), float(facts["bound"]), str(facts.pop("unit"))
+        value, unit = float(facts["value"]), str(facts.pop("unit"))
+        bound = float(facts.get("bound", value))  # Without a bound the message has the value alone.
         facts |= {"value": ComparedValue(value, bound, unit), "bound": ComparedValue(bound, value, unit)}
     return message(f"remark.{note.code}", **_with_names(facts))
 

@@ -365,19 +365,23 @@ class CycleCapture:
         self._waiting.clear()
 
     def _describe_break(self) -> Remark:
-        """Returns that the client stopped the motion before a last command, while the arm moved; "" if it did not.
+        """Returns that the client stopped the motion before its end; "" if it did not.
 
-        Torques may end at any speed.
+        Where requests end motions, too, those stopped it before its end that came while joints moved. Torques may end
+        at any speed there.
         """
-        is_streamed = self._playout.is_streamed and self._arm.mode.kind is not CommandKind.TORQUES
-        if self._playout.is_finished or not (is_streamed and self._has_played):
+        if self._playout.is_finished or not self._has_played:
             return Remark("")
         n, row = self._ring.n, self._last_played % CAPACITY * self._size
         dq_c = np.frombuffer(self._memory, count=n, offset=row + self._offsets["dq_c"])
         joint = int(np.abs(dq_c).argmax())
         speed = abs(float(dq_c[joint]))
-        if speed < _STANDSTILL:
+        is_streamed = self._playout.is_streamed
+        is_too_fast = is_streamed and self._arm.mode.kind is not CommandKind.TORQUES and speed >= _STANDSTILL
+        if not (self._arm.ends_by_command or is_too_fast):
             return Remark("")
+        if not (is_streamed and speed > 0.0):
+            return Remark("the client stopped the motion without a last command", "client_stopped_early")
         sentence = f"the client stopped the motion while joint {joint + 1} moved at {speed:.3g} rad/s"
         return Remark(sentence, "client_stopped", joint=joint + 1, speed=speed)
 

@@ -84,6 +84,8 @@ class VirtualArm:
         resting_law: The control law while no command is followed. BRAKED engages the brakes at standstill.
         is_monitored: Whether measurements are checked.
         on_loss: What the arm does while commands are missing, from the next motion on.
+        ends_by_command: Whether a motion runs to its end only by a last command of the client, as where a request to
+            stop breaks it off.
         warnings: Sentences about the motions so far; the reader clears them.
         playback: The output of the queue in the last cycle; None while no commands are followed.
         on_command: Called with every command that arrives for a motion, except for duplicates.
@@ -130,6 +132,7 @@ class VirtualArm:
         self._has_warned = False  # Of the present pause.
         self._friction_watch = friction_watch
         self.on_loss: LossBehaviour = on_loss
+        self.ends_by_command = False
         self._actuator = Actuator(model, parameters)
         self._tau_c: list[float] | None = None
         self._tool_version = self.commanded.version

@@ -49,6 +49,15 @@ def test_the_page_has_what_its_interface_has_and_nothing_of_another(fr3):
     assert "?" not in where.inner_text()  # Without the ports that clients find themselves.
 
 
+def test_the_note_on_its_elbow_is_as_wide_as_its_group(fr3):
+    page = fr3
+    page.open_tab("Target")
+    note = page.tab.locator(".rl-note:visible", has_text="does not move on a circle")
+    note.wait_for()
+    group = note.locator("xpath=ancestor::*[contains(@class, 'mantine-Paper-root')][1]")
+    assert note.bounding_box()["width"] > 0.85 * group.bounding_box()["width"]
+
+
 def test_a_plan_is_checked_by_its_conditions_and_executed(fr3, heard):
     page = fr3
     page.plan_to(1, -40.0 if page.status.q_c[0] > 0 else 40.0)

@@ -1,6 +1,8 @@
 """The signal that violated a condition, cycle by cycle, computed from the recorded cycles as in the controller.
 
-A value is in the row of the state that shows it: the command that answers one state is checked in the next cycle.
+A value is in the row of the state that shows it: the command that answers one state is checked in the next cycle. Where
+a client missed states, the controller has continued the motion by itself: what follows from the commands before and
+after such a gap is not known (NaN).
 """
 
 from __future__ import annotations
@@ -65,8 +67,8 @@ class FaultSignal:
 
     @property
     def is_broken(self) -> bool:
-        """Whether the last value is outside its bounds."""
-        return not bool(self.lower[-1] < self.value < self.upper[-1])
+        """Whether the last value is outside its bounds; False if it is not known."""
+        return bool(self.value <= self.lower[-1] or self.value >= self.upper[-1])
 
     @property
     def excess(self) -> float:
@@ -164,13 +166,13 @@ class Signals:
                 return np.array([[links(q)[0]] for q in self._rows["q"]])
             case "joint":
                 commands = self._joint_commands()
-                return None if commands is None else _differences(commands, condition.order, self._period)
+                return None if commands is None else self._differences(commands, condition.order)
             case "joint_step":
                 commands = self._joint_commands()
                 return None if commands is None else np.diff(commands, axis=0)[_BEFORE - 1 :]
             case "torque":
                 torques = self._sent("command_tau", np.zeros(self._model.n))
-                return None if torques is None else _differences(torques, condition.order, self._period)
+                return None if torques is None else self._differences(torques, condition.order)
             case _:
                 return self._commanded_tool(condition)
 
@@ -188,13 +190,14 @@ class Signals:
             return self._singularity(poses)
         if condition.signal == "arm_angle":
             psi = self._sent("command_psi", self._psi(self._rows["q_c"][:1])[0])
-            return None if psi is None else _differences(np.unwrap(psi)[:, None], condition.order, self._period)
+            return None if psi is None else self._differences(np.unwrap(psi)[:, None], condition.order)
         if condition.signal not in ("translation", "rotation") or condition.order == 0:
             return None
         is_turn = condition.signal == "rotation"
         steps = rotation_steps(poses[:, :3, :3]) if is_turn else np.diff(poses[:, :3, 3], axis=0)
         rates = np.diff(steps, condition.order - 1, axis=0) / self._period**condition.order
-        return np.linalg.norm(rates, axis=1)[_BEFORE - condition.order :, None]
+        speeds = np.linalg.norm(rates, axis=1)[_BEFORE - condition.order :, None]
+        return self._without_gaps(speeds, condition.order)
 
     def _speed_of_joints(self, joints: Array) -> Array:
         """Returns the speed of the tool from one commanded row of angles to the next, (N, 1), [m/s].
@@ -287,16 +290,25 @@ class Signals:
     def _psi(self, q: Array) -> Array:
         return self._closed_form.redundancy_angle_path(q)
 
+    def _differences(self, values: Array, order: int) -> Array:
+        rates = np.diff(values, order, axis=0)[_BEFORE - order :] / self._period**order
+        return self._without_gaps(rates, order)
+
+    def _without_gaps(self, rates: Array, order: int) -> Array:
+        """Returns differences of commands, with NaN in the rows of those between which states were missed."""
+        numbers = self._rows["message_id"].astype(np.int64)
+        is_gap = np.diff(numbers) * CYCLE_TIME > 1.5 * self._period  # Before the command of each row but the first.
+        unknown = np.zeros(len(rates), dtype=bool)
+        for age in range(1, order + 1):
+            unknown[1 + age :] |= is_gap[: len(rates) - 1 - age]
+        return np.where(unknown[:, None], np.nan, rates)
+
     def _sent(self, name: str, before: Array | float) -> Array | None:
         """Returns the checked values of each row, with `_BEFORE` rows of standstill in front; None: none were sent."""
         sent = self._rows[name][:-1]
         if not len(sent) or not np.isfinite(sent.reshape(len(sent), -1)).all():
             return None
         return np.concatenate((np.repeat(np.asarray(before)[None], _BEFORE + 1, axis=0), sent))
-
-
-def _differences(values: Array, order: int, period: float) -> Array:
-    return np.diff(values, order, axis=0)[_BEFORE - order :] / period**order
 
 
 def _low_passed(rates: Array, period: float) -> Array:

@@ -80,7 +80,7 @@ def no_ring_html(redundancy: Redundancy, text: Text) -> str:
     """Returns why there is no circle: the pose has none, or the arm has none."""
     joint = redundancy.joint
     sentence = text("elbow.none") if joint is None else text("elbow.no_circle", joint=joint)
-    return f'<p class="rl-note">{esc(sentence)}</p>'
+    return f'<p class="rl-note rl-across">{esc(sentence)}</p>'
 
 
 def ring_html(elbow: Elbow, text: Text, *, is_nearest: bool = False) -> str:

@@ -60,7 +60,8 @@ def test_the_errors_of_franka_come_one_at_a_time_with_their_reason_and_the_arm_m
             assert fault in demo.reported if is_of_tool else demo.reported == (fault,)
             assert demo.condition.fault is fault
             lower, upper, inside = demo.signal.lower[:-1], demo.signal.upper[:-1], demo.signal.values[:-1]
-            assert ((lower < inside) & (inside < upper)).all(), fault
+            known = np.isfinite(inside)  # Not where the client missed states.
+            assert ((lower < inside) & (inside < upper))[known].all(), fault
             assert fault.manual_name in demo.explain("en")
             assert demo.describe("sent", "en") != demo.describe("sent", "zh")
             assert demo.way_out[-2:] == ("recover", "move")

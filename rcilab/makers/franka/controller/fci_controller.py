@@ -121,6 +121,7 @@ class FciController:
         self._limit_table = DEFAULT_TABLE
         self._message_id = 0
         arm.on_loss = "bridge"
+        arm.ends_by_command = True
         arm.playout.window = SUCCESS_WINDOW
         arm.configure(self.settings)
         arm.resting_law = ControlLaw.POSITION

@@ -30,8 +30,8 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.reported_pose import ReportedPose
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
-from rcilab.i18n.rounding import format_pair
 from rcilab.i18n.translator import Remark
+from rcilab.makers.franka.collisions import CollisionThresholds, describe_collisions
 from rcilab.makers.franka.controller.settings import Settings
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.robots.arm import CRAIG
@@ -52,7 +52,6 @@ tool are reported; rcilab's own choice."""
 _SINGULAR_SQUARE = SINGULAR**2 * np.eye(6)
 _JOINT_4 = 3  # From 0.
 _TWISTS = tuple((cos(row.alpha), sin(row.alpha)) for row in CRAIG[:6])  # Of the joints with a sensor.
-_AXES = ("along x", "along y", "along z", "about x", "about y", "about z")
 _O_T_EE, _O_T_EE_D = SLICES["O_T_EE"], SLICES["O_T_EE_d"]
 _FROM_ELBOW = slice(SLICES["elbow"].start, NUMBERS)  # These numbers are written at once, in the order of `FIELDS`.
 _ELBOWS, _MOTION = slice(0, 4), slice(4, None)
@@ -193,20 +192,13 @@ class StateReporter:
     def describe_collisions(self) -> Iterator[Remark]:
         """Yields each external torque and force of the last state that is above its upper threshold."""
         assert self._signals is not None  # `report` has set it.
-        is_accelerating, t = self._signals.commanded.is_accelerating, self._settings.thresholds
-        torques = t.collision_torque_accelerating if is_accelerating else t.collision_torque
-        forces = t.collision_force_accelerating if is_accelerating else t.collision_force
-        for joint, (value, bound) in enumerate(zip(self._signals.tau_ext.tolist(), torques, strict=True), 1):
-            if abs(value) > bound:
-                excess = _describe_excess(value, bound, "N m", f"tau_ext_hat_filtered[{joint - 1}]")
-                sentence = f"joint {joint}: external torque {excess}"
-                yield Remark(sentence, "collision", joint=joint, value=abs(value), bound=bound, unit="N m")
-        for number, (value, bound) in enumerate(zip(self._wrench_in_K.tolist(), forces, strict=True)):
-            if abs(value) > bound:
-                axis, unit = _AXES[number], "N" if number < 3 else "N m"
-                excess = _describe_excess(value, bound, unit, f"K_F_ext_hat_K[{number}]")
-                sentence = f"external {'force' if number < 3 else 'moment'} {axis} of K: {excess}"
-                yield Remark(sentence, "external_force", axis=axis[-1], value=abs(value), bound=bound, unit=unit)
+        t, present = self._settings.thresholds, self._contacts.present
+        bounds = CollisionThresholds(t.collision_torque, t.collision_force)
+        if self._signals.commanded.is_accelerating:
+            bounds = CollisionThresholds(t.collision_torque_accelerating, t.collision_force_accelerating)
+        flags = present.joint_collision, present.cartesian_collision
+        torques, wrench = -self._signals.tau_ext, -self._wrench_in_K  # With the sign that clients read.
+        return describe_collisions(flags, torques.tolist(), wrench.tolist(), bounds)
 
     def reset_collisions(self) -> None:
         """Clears the flags of collisions, as an error recovery does."""
@@ -257,13 +249,6 @@ class StateReporter:
 
     def _side(self, q4: float) -> float:
         return 1.0 if q4 > self._flip else -1.0
-
-
-def _describe_excess(value: float, bound: float, unit: str, field: str) -> str:
-    """Returns by how much an external torque or force exceeds its threshold, and with which sign clients read it."""
-    size, threshold = format_pair(abs(value), bound)
-    sign = "-" if value > 0.0 else ""
-    return f"{size} {unit} is above its threshold {threshold} {unit} ({field} is {sign}{size})"
 
 
 def columns_of(pose: Pose) -> tuple[float, ...]:

@@ -15,6 +15,7 @@ from rcilab.core.errors import CommandRejectedError, ConnectionLostError, Rcilab
 from rcilab.core.spatial import as_pose
 from rcilab.core.state import ControllerMode
 from rcilab.makers.address import ControllerAddress
+from rcilab.makers.franka.collisions import CollisionThresholds
 from rcilab.makers.franka.driver.client_sockets import open_with_sockets
 from rcilab.makers.franka.driver.libraries import kept_scheduling
 from rcilab.makers.franka.driver.state_reader import number_of
@@ -30,6 +31,7 @@ class FciClient(ABC):
     Attributes:
         robot: The library's `Robot`, for requests; see `request`.
         sockets: Its sockets.
+        thresholds: The upper thresholds of collisions that were set over this connection; None before.
 
     Args:
         library: The client library.
@@ -48,6 +50,7 @@ class FciClient(ABC):
 
     def __init__(self, library: Any, address: ControllerAddress, state_size: int) -> None:
         self._name = str(address)
+        self.thresholds: CollisionThresholds | None = None
 
         def open_robot() -> tuple[Any, Any]:
             robot = library.Robot(address.host, library.RealtimeConfig.kIgnore)

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.core.arrays import JointVector
 from rcilab.core.limits import Limits
-from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode
 from rcilab.i18n.translator import Remark
 from rcilab.makers.command_findings import CommandConditions, find_commanded, find_followed, find_lost_commands
@@ -58,12 +56,14 @@ def describe_faults(
     limits: Limits,
     mode: ControllerMode,
     *,
-    late: str = "",
-    pressed: str = "",
-    box: SafetyBox | None = None,
-    collision_thresholds: JointVector | None = None,
+    collisions: Iterable[Remark],
+    late: str,
+    pressed: str,
 ) -> FaultReport:
-    """Returns the diagnosis of a motion's end; see `StreamingDriver.describe_faults`."""
+    """Returns the diagnosis of a motion's end; see `StreamingDriver.describe_faults`.
+
+    `collisions` are the external torques and forces above their thresholds, for a reflex.
+    """
     faults = tuple(faults)
     when = "before the first command" if math.isnan(t) else _describe_time(t, record)
     if pressed:
@@ -75,7 +75,8 @@ def describe_faults(
     commanded, is_violated = find_commanded(faults, record, limits, conditions)
     followed = find_followed(faults, record, model, limits, conditions)
     lost = find_lost_commands(record) if FrankaError.COMMUNICATION_CONSTRAINTS_VIOLATION in faults else ""
-    found = [part for part in (commanded, followed, lost, _describe_reflex(faults, record)) if part]
+    found = [part for part in (commanded, followed, lost) if part]
+    found += _describe_reflex(faults, record, collisions)
     advice = late or next((_ADVICE[fault] for fault in faults if fault in _ADVICE), "")
     advice = advice or (_OF_JOINTS if followed and not is_violated else _SMOOTHNESS)
     parts = [f"the controller stopped the motion {when}: {names}", *found, advice]
@@ -91,11 +92,14 @@ def _describe_time(t: float, record: NDArray[np.void]) -> str:
     return f"between t = {before:.3f} s and {t:.3f} s (no state was read meanwhile)"
 
 
-def _describe_reflex(faults: tuple[FrankaError, ...], record: NDArray[np.void]) -> str:
-    """Returns the external force at the end, for a reflex; "" for other errors."""
-    if not (_REFLEXES & set(faults) and len(record)):
-        return ""
-    wrench = record["tau_ext_in_base"][-1]
-    if not np.isfinite(wrench).all():
-        return ""
-    return f"an external force of {np.linalg.norm(wrench[:3]):.3g} N acts at the tool"
+def _describe_reflex(
+    faults: tuple[FrankaError, ...], record: NDArray[np.void], collisions: Iterable[Remark]
+) -> list[str]:
+    """Returns what caused a reflex, else the external force at the end; nothing for other errors."""
+    if not _REFLEXES & set(faults):
+        return []
+    found: list[str] = list(collisions)
+    wrench = record["tau_ext_in_base"][-1:]
+    if not found and len(wrench) and np.isfinite(wrench).all():
+        found.append(f"an external force of {np.linalg.norm(wrench[0, :3]):.3g} N acts at the tool")
+    return found

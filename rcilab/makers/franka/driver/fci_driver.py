@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.core.arrays import JointVector
 from rcilab.core.command import Command, CommandFilter
 from rcilab.core.errors import CommandRejectedError, InvalidValueError, ModelError
 from rcilab.core.limits import Limits
+from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
 from rcilab.makers.address import ControllerAddress
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.makers.driver import ConfiguredArm, ExpectedArm, GuideKind, GuideSpace, RequestLock, SafetyStopReason
+from rcilab.makers.driver import (
+    ConfiguredArm,
+    ExpectedArm,
+    FaultReport,
+    GuideKind,
+    GuideSpace,
+    RequestLock,
+    SafetyStopReason,
+)
+from rcilab.makers.franka.collisions import describe_collisions
 from rcilab.makers.franka.driver.active_client import ActiveClient
 from rcilab.makers.franka.driver.address import parse_address
 from rcilab.makers.franka.driver.callback_client import CallbackClient
@@ -270,4 +284,28 @@ class FciDriver:
             return None
         return LibfrankaFilter(limits, LOST_CYCLES[version_of(self.arm_name)], cut_off)
 
-    describe_faults = staticmethod(describe_faults)
+    def describe_faults(
+        self,
+        faults: Iterable[FrankaError],
+        record: NDArray[np.void],
+        t: float,
+        model: RobotModel,
+        limits: Limits,
+        mode: ControllerMode,
+        *,
+        late: str = "",
+        pressed: str = "",
+        box: SafetyBox | None = None,
+        collision_thresholds: JointVector | None = None,
+    ) -> FaultReport:
+        """Returns the diagnosis of the faults that ended a motion; those of a reflex are in the newest state."""
+        raw = self._client.newest
+        collisions = describe_collisions(
+            (raw.joint_collision, raw.cartesian_collision),
+            raw.tau_ext_hat_filtered,
+            raw.K_F_ext_hat_K,
+            self._client.thresholds,
+        )
+        return describe_faults(
+            faults, record, t, model, limits, mode, collisions=collisions, late=late, pressed=pressed
+        )

@@ -7,7 +7,6 @@ from contextlib import contextmanager
 
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import as_vector
 from rcilab.core.errors import ModelError
 from rcilab.core.spatial import Pose
 from rcilab.makers.configuration import RobotConfiguration
@@ -65,21 +64,6 @@ class FciSessionCommands(FciSettings):
             model = self._arm.model.with_load(combine_payloads(self.end_effector, load))
             super().set_load(load.mass, load.center_of_mass, load.inertia)
             self._arm.model = model
-
-    def set_collision_behavior(
-        self, lower_torques: ArrayLike, upper_torques: ArrayLike, lower_forces: ArrayLike, upper_forces: ArrayLike
-    ) -> None:
-        """Sets thresholds of external torques and forces: above the lower one a contact, above the upper one a stop.
-
-        Args:
-            lower_torques: Of contacts, shape (7,), [N m].
-            upper_torques: Of collisions, shape (7,), [N m].
-            lower_forces: Of contacts, in the stiffness frame, shape (6,), [N, N m].
-            upper_forces: Of collisions, shape (6,), [N, N m].
-        """
-        with self._lock.acquire("setCollisionBehavior"):
-            super().set_collision_behavior(lower_torques, upper_torques, lower_forces, upper_forces)
-            self._arm.collision_thresholds = as_vector(upper_torques, self._arm.model.n, "upper_torques")
 
     def set_output(self, signal: int, level: bool) -> None:
         """Raises an error: there are no digital signals."""

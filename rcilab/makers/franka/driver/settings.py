@@ -18,6 +18,7 @@ from rcilab.core.fault import name_faults
 from rcilab.core.spatial import IDENTITY, Pose, as_pose
 from rcilab.core.state import RobotMode
 from rcilab.makers.franka.bounds import CARTESIAN_STIFFNESS, LARGEST_JOINT_STIFFNESS, LONGEST_TOOL
+from rcilab.makers.franka.collisions import CollisionThresholds
 from rcilab.makers.franka.driver.client import ANSWER_TIMEOUT, FciClient, columns_of
 from rcilab.makers.franka.driver.state_reader import errors_of
 from rcilab.makers.setting_values import bounded_vector
@@ -75,6 +76,7 @@ class FciSettings:
         heavy = bounded_vector("upper_forces", upper_forces, _AXES, "N, N m", light)
         with self._request("setCollisionBehavior"):
             self._client.robot.set_collision_behavior(*(values.tolist() for values in (low, high, light, heavy)))
+        self._client.thresholds = CollisionThresholds(high.tolist(), heavy.tolist())
 
     def set_joint_impedance(self, stiffness: ArrayLike) -> None:
         """Sets the stiffness of the joints in every mode but Cartesian impedance and torques, shape (7,), [N m/rad]."""

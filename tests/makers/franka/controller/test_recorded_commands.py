@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from math import cos, pi, sin
 
 import numpy as np
@@ -90,6 +91,44 @@ def test_the_record_has_velocities_and_goals_and_its_check_the_angles_that_follo
         way = height[1] - height[0] if generator == 3 else moved[6]
         assert way == pytest.approx(SPEED * 1e-3 * CYCLES / 2.0, rel=1e-3)
     assert check_sent(run).ok
+    ring.close()
+
+
+STILL = "the client stopped the motion without a last command"
+SLOW = r"the client stopped the motion while joint 7 moved at 0\.001 rad/s"
+
+
+@pytest.mark.parametrize(
+    ("mode", "is_goal", "speed", "is_last", "found"),
+    [
+        ((0, 1), False, 1e-3, False, SLOW),
+        ((0, 1), False, 0.0, False, STILL),
+        ((0, 0), True, 0.0, False, STILL),
+        ((2, 4), False, 0.0, False, STILL),
+        ((0, 1), False, 0.0, True, ""),
+    ],
+)
+def test_a_motion_ran_to_its_end_only_with_a_last_command(
+    mode: tuple[int, int], is_goal: bool, speed: float, is_last: bool, found: str
+) -> None:
+    controller, capture, motions, ring = recorded("FR3", VERSION_10)
+    start = tuple(controller.state.q_c.tolist())
+    assert controller.begin_move(AsyncMove(*mode, DEVIATION, DEVIATION, is_goal, (0.5,) * 7)) is Status.MOTION_STARTED
+    controller.step()
+    capture.write()
+    for size in (0.0, speed, speed):
+        controller.receive(packet(controller.cycle_number, mode[1], size, start, is_last=is_last))
+        controller.step()
+        capture.write()
+    controller.stop_move()
+    while controller.phase is not Phase.IDLE:
+        controller.step()
+        capture.write()
+    for _ in range(2):
+        controller.step()
+        capture.write()
+    (end,) = [part.end for part in motions.poll(is_last=True) if part.end is not None]
+    assert re.fullmatch(found, end.stopped or "")
     ring.close()
 
 

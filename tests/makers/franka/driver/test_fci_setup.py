@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 
 import numpy as np
@@ -132,22 +133,36 @@ def test_soft_springs_let_a_push_move_the_arm(robot):
     assert moved[1] > 1e-3
 
 
-def test_a_force_above_its_threshold_is_a_reflex_with_its_size(robot):
+def _hold_and_push(robot, force):
     q0 = robot.state.q_c
-    robot.fci.set_collision_behavior([10.0] * 7, [10.0] * 7, [10.0] * 6, [10.0] * 6)
 
     def hold(state, t):
         if 0.05 <= t < 0.0505:
-            robot.simulation.push([0.0, 0.0, -25.0, 0.0, 0.0, 0.0], duration=0.2)
+            robot.simulation.push([0.0, 0.0, force, 0.0, 0.0, 0.0], duration=0.2)
         return JointPosition(q0, finished=t >= 0.5)
 
-    with pytest.raises(
-        ControlError, match=r"external force of [12]\d(\.\d+)? N acts at the tool; check for contact"
-    ) as caught:
+    with pytest.raises(ControlError) as caught:
         robot.control(hold)
-    assert FrankaError.CARTESIAN_REFLEX in caught.value.faults
     robot.simulation.release()
     robot.recover()
+    return caught.value
+
+
+def test_a_reflex_names_joint_or_axis_with_value_and_threshold(robot):
+    thresholds = (5.0,) * 7 + (30.0,) * 6
+    robot.configure(RobotConfiguration(control=ControllerParameters(collision_thresholds=thresholds)))
+    error = _hold_and_push(robot, -25.0)
+    assert error.faults == (FrankaError.JOINT_REFLEX,)
+    found = error.finding.parts[0]
+    assert (found.code, found.facts["bound"]) == ("collision", 5.0)
+    assert 5.0 < found.facts["value"] < 10.0
+    assert f"joint {found.facts['joint']}: external torque {found.facts['value']:.4g} N m is above" in str(error)
+
+    robot.fci.set_collision_behavior([30.0] * 7, [30.0] * 7, [15.0] * 6, [15.0] * 6)
+    error = _hold_and_push(robot, -25.0)
+    assert error.faults == (FrankaError.CARTESIAN_REFLEX,)
+    found = r"force along z of K: \d\d\S* N is above its threshold 15 N \(K_F_ext_hat_K\[2\] is -\d\d\S*\)"
+    assert re.search(found, str(error))
     robot.configure(RobotConfiguration(control=default_parameters(parameters_of(robot.model))))
 
 
