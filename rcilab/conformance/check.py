@@ -182,9 +182,10 @@ def _check(
     mode = require_mode(mode)
     table = condition_table(model.description)
     if mode not in table.modes:
-        raise ModelError(f"the controller of {model.name} has no {mode.replace('_', ' ')} mode").coded(
-            "no_feature", model=model.name, feature=mode
-        )
+        modes = ", ".join(one.replace("_", " ") for one in table.modes)
+        raise ModelError(
+            f"the controller of {model.name} has no {mode.replace('_', ' ')} mode; its modes: {modes}"
+        ).coded("no_feature", model=model.name, feature=mode)
     rows = table.rows(mode, has_elbow=bool(model.redundancy), has_box=box is not None)
     if distance is not None:
         rows = (*rows, *clearance_conditions(distance))

@@ -212,13 +212,20 @@ def explain_place(found: ConditionResult | Violation, language: Language = "en")
     Raises:
         InvalidValueError: The language is unknown.
     """
-    row, axis = found.condition, str(found.joint)
     if found.links is not None:
         first, second = (_link(number, _Writer(language)) for number in found.links)
         return translate(language, "place.pair", first=first, second=second)
-    return translate(
-        language, f"place.{'joint' if row.is_per_joint and found.joint else row.location(found.joint)}", axis=axis
-    )
+    return explain_axis(found.condition, found.joint, language)
+
+
+def explain_axis(row: Condition, axis: int, language: Language = "en") -> str:
+    """Returns the part of the arm that a value of a condition belongs to: "joint 2", "tool".
+
+    Raises:
+        InvalidValueError: The language is unknown.
+    """
+    place = "joint" if row.is_per_joint and axis else row.location(axis)
+    return translate(language, f"place.{place}", axis=str(axis))
 
 
 def explain_quantity(row: Condition, language: Language = "en") -> str:

@@ -75,6 +75,8 @@ class Condition:
     """When it is checked."""
     signal: Signal = "joint"
     """The signal it bounds."""
+    part: str = ""
+    """Part of the arm that its value belongs to, where that does not follow from the signal."""
     order: int
     """Derivative of the signal that it bounds: 0 the signal itself, 3 its jerk."""
     bounds: Callable[[AnyLimits], Bounds]
@@ -114,7 +116,7 @@ class Condition:
         """
         if self.is_per_joint:
             return f"joint {axis}" if axis else "joints"
-        return _LOCATIONS.get(self.signal, "tool")
+        return self.part or _LOCATIONS.get(self.signal, "tool")
 
     def __repr__(self) -> str:
         return f"<Condition {self.id}: {self.formula} ({self.necessity})>"

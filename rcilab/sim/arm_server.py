@@ -561,9 +561,10 @@ class ArmServer:
                     whose = f"the client is at {client}" if client else "no client is connected"
                     text = f"ignored a UDP datagram from {address} and will ignore further ones: {whose}"
                     self._log.write("unknown_sender", text, sender=address, client=client)
-                case ClientRefused(address, holder):
-                    text = f"refused another client from {address}: {holder} is connected"
-                    self._log.write("client_refused", text, client=address, connected=holder)
+                case ClientRefused(address, holders):
+                    others = f"{holders[0]} is" if len(holders) == 1 else f"{len(holders)} clients, the most, are"
+                    text = f"refused another client from {address}: {others} connected"
+                    self._log.write("client_refused", text, client=address, connected=", ".join(holders))
 
     def _warn_of_other_target(self, address: str) -> None:
         """Warns of a client that does not receive the states, because another address was given for them.

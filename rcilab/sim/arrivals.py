@@ -53,7 +53,8 @@ class ClientRefused:
     """A channel refused a client because of its limit."""
 
     address: str
-    holder: str
+    holders: tuple[str, ...]
+    """Addresses of the clients that are connected."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -357,7 +357,7 @@ class Endpoint:
         clients = [peer for peer in self._sockets if peer.channel is channel]
         if len(clients) >= channel.max_clients:
             sock.close()
-            self._arrivals.append(ClientRefused(address, ", ".join(client.address for client in clients)))
+            self._arrivals.append(ClientRefused(address, tuple(client.address for client in clients)))
             return
         sock.setblocking(False)
         if not is_local:

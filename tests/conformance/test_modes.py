@@ -497,8 +497,10 @@ def test_rest_is_asked_for_at_both_ends_and_nowhere_else(name, mode):
 
 
 @pytest.mark.parametrize("name", ["RM75", "xArm6"])
-def test_a_mode_that_the_controller_has_not_is_refused(name):
+@pytest.mark.parametrize("mode", ["torque", "cartesian_position"])
+def test_a_mode_that_the_controller_has_not_is_refused(name, mode):
     model = load_model(name)
     motion = plan_joint(model, model.home, model.home + 0.05, speed=0.3)
-    with pytest.raises(ModelError, match=f"the controller of {name} has no torque mode"):
-        check(motion, model, mode="torque")
+    word = mode.replace("_", " ")
+    with pytest.raises(ModelError, match=f"the controller of {name} has no {word} mode; its modes: joint position$"):
+        check(motion, model, mode=mode)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rcilab.app.fault_lab.signals import FaultSignal
 from rcilab.app.text import Text
-from rcilab.conformance.explain import explain_formula, explain_source
+from rcilab.conformance.explain import explain_axis, explain_formula, explain_quantity, explain_source
 from rcilab.core.arrays import Array, JointVector, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
@@ -180,12 +180,14 @@ class FaultDemo:
         row = self.condition
         if row is None:
             return []
-        formula, source = explain_formula(row, language), explain_source(row, language)
+        assert self.signal is not None
         number = text(
-            "demo.number", value=f"{self.value:.4g}", bound=f"{self.bound:.4g}", unit=row.unit,
-            time=f"{self.time:.3f}",
+            "demo.number", quantity=explain_quantity(row, language), value=f"{self.value:.4g}",
+            bound=f"{self.bound:.4g}", unit=row.unit, time=f"{self.time:.3f}",
+            place=explain_axis(row, self.signal.axis, language),
         )  # fmt: skip
-        return [f"  {text('demo.head.condition')} {formula}; {self.place}: {number} [{source}]"]
+        line = text("joined", first=explain_formula(row, language), second=number)
+        return [f"  {text('demo.head.condition')} {line} [{explain_source(row, language)}]"]
 
     def __str__(self) -> str:
         return self.explain()

@@ -33,6 +33,7 @@ from rcilab.makers.realman.bounds import LARGEST_STREAM_STEP
 from rcilab.makers.realman.errors import RealManError
 
 _ERRORS = "RealMan's page Appendix: error codes"
+_SET = f"{_ERRORS}; bound: set in the controller, of a new one that of the maker's client library"
 _OURS = "rcilab; the controller has no error for it"
 
 _JOINT_ERRORS = {
@@ -61,7 +62,7 @@ def _recommended(row: Condition) -> Condition:
 
 def _joint_row(row: Condition) -> Condition:
     fault = _JOINT_ERRORS.get(row.id)
-    return _recommended(row) if fault is None else replace(row, fault=fault, source=_ERRORS)
+    return _recommended(row) if fault is None else replace(row, fault=fault, source=_SET)
 
 
 def _tool_row(row: Condition) -> Condition:
@@ -111,6 +112,7 @@ _FENCE = replace(
     id="links.fence",
     quantity="distance of a link beyond the fence",
     formula="d < 0",
+    part="links",
     fault=RealManError.FENCE,
     source="RealMan's page Electronic fence (links: capsules of rcilab)",
 )
@@ -127,7 +129,7 @@ REALMAN_CONDITIONS = ConditionTable(
     torque=_TORQUES,
     measured=_MEASURED,
     box=_BOX,
-    modes=("joint_position", "cartesian_position"),
+    modes=("joint_position",),
     conditions=(*_MOTION, _STEP, _FENCE, _BOX, *_TOOL, *_TORQUES, *_MEASURED, _CONTACT, _LINKS),
 )
 """The rows for `check` and the monitors."""

@@ -116,7 +116,7 @@ UFACTORY_CONDITIONS = ConditionTable(
     torque=(),
     measured=_MEASURED,
     box=_BOX,
-    modes=("joint_position", "cartesian_position"),
+    modes=("joint_position",),
     conditions=tuple({row.id: row for row in (*_MOTION, _BOX, *_CARTESIAN, *_BEHAVIOUR)}.values()),
     command_cycles=round(REPORT_PERIOD / CYCLE_TIME),
 )

@@ -16,7 +16,7 @@ from rcilab.sim.planner.planner_event import EventKind, PlannerEvent, Refusal
 from rcilab.sim.planner.preparation import PlannedArm, Preparation, PreparedTarget
 from rcilab.sim.planner.section import Section
 from rcilab.sim.planner.section_bounds import ShareBounds
-from rcilab.sim.planner.target import PauseTarget, Target
+from rcilab.sim.planner.target import JointTarget, PauseTarget, Target
 
 _AHEAD = 16  # Targets that are known ahead, the running one among them.
 _DIFFERENCE = 1e-4  # Step of the share for derivatives by it.
@@ -106,6 +106,16 @@ class PathMotion:
     def current(self) -> Target | None:
         """The target that has begun and not ended."""
         return self._chain[0].target if self._chain else None
+
+    @property
+    def end_q(self) -> list[float] | None:
+        """Joint angles at the end of the last target, n plain floats, [rad]; None: they are not computed yet."""
+        q = list(self._next_start())
+        for target in self._waiting:
+            if not isinstance(target, JointTarget) or target.q is None:
+                return None
+            q = [a + b for a, b in zip(q, target.q, strict=True)] if target.is_relative else list(target.q)
+        return q
 
     @property
     def progress(self) -> float:

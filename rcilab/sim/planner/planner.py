@@ -140,6 +140,12 @@ class Planner:
         return self._queue.current
 
     @property
+    def end_q(self) -> list[float] | None:
+        """Joint angles at the end of the queue, n plain floats, [rad]; None: they are not known yet."""
+        is_moving = self._mover is not None and not self._mover.is_stationary
+        return None if is_moving else self._queue.end_q if self.queued else self.q
+
+    @property
     def streamed(self) -> list[float] | None:
         """The newest streamed angles, n plain floats, [rad]; None while another motion, or none, is followed."""
         mover = self._mover

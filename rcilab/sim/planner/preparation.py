@@ -240,7 +240,10 @@ class Preparation:
         return replace(path, goal=end, circle=circle, distance=path.distance * turns)
 
     def _in_base(self, pose: Pose, frame: str) -> Pose:
-        return self._arm.model.forward(self._start) @ pose if frame == "tool" else pose
+        if frame == "base":
+            return pose
+        start = self._arm.model.forward(self._start)
+        return start @ pose if frame == "tool" else _shifted(start, pose)
 
     def _finish(self, sampling: Sampling) -> None:
         arm, target, section = self._arm, self.target, self._section
@@ -289,6 +292,13 @@ def sampled_bounds(
         along = poses, strictest([tool_bounds(arm.limits.cartesian, speed) for speed in speeds])
     rows = np.array(sampling.rows)
     return slower(bounds_of_samples(rows, strictest(limits, rows.shape[1]), line.velocity, along), line)
+
+
+def _shifted(start: Pose, offset: Pose) -> Pose:
+    """Returns a pose after an offset: shifted and turned in the axes of the base."""
+    rotation, _ = (Pose.from_parts(offset.parts[0], (0.0, 0.0, 0.0)) @ start).parts
+    x, y, z = (a + b for a, b in zip(start.parts[1], offset.parts[1], strict=True))
+    return Pose.from_parts(rotation, (x, y, z))
 
 
 def _largest_rates(tool: Array) -> tuple[float, float]:

@@ -7,8 +7,9 @@ from typing import Literal, TypeAlias
 
 from rcilab.core.spatial import Pose
 
-PoseFrame: TypeAlias = Literal["base", "tool"]
-"""Axes in which a pose is given: the base, or the tool at the end of the target before."""
+PoseFrame: TypeAlias = Literal["base", "tool", "offset"]
+"""Axes in which a pose is given: the base, or the tool at the end of the target before. An offset shifts and turns that
+tool in the axes of the base."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -69,21 +69,20 @@ def test_planned_motions_conform(name):
     assert check(plan_joint(model, model.home, model.home + 0.2, speed=0.5), model).ok
     home = model.forward(model.home)
     line = plan_line(model, model.home, Pose(home.position + (0.0, 0.06, -0.08), home.wxyz), speed=1.0)
-    assert check(line, model, mode="cartesian_position").ok
+    assert check(line, model).ok
 
 
 @pytest.mark.parametrize(
-    ("motion", "mode", "ids", "code"),
+    ("motion", "ids", "code"),
     [
-        (spoiled(1, 3.5), "joint_position", "joint.velocity", 24),
-        (spoiled(1, 3.1), "joint_position", "servo.velocity.translation", 60),
-        (spoiled(1, 2.9), "cartesian_position", "cartesian.velocity.translation", 24),
-        (spoiled(2, 25.0), "joint_position", "joint.acceleration", 24),
-        (spoiled(3, 600.0), "joint_position", "joint.jerk", 25),
+        (spoiled(1, 3.5), "joint.velocity", 24),
+        (spoiled(1, 3.1), "servo.velocity.translation", 60),
+        (spoiled(2, 25.0), "joint.acceleration", 24),
+        (spoiled(3, 600.0), "joint.jerk", 25),
     ],
 )
-def test_a_target_beyond_a_bound_has_the_code_of_the_client_library(motion, mode, ids, code):
-    found = {v.condition.id: v.condition.fault for v in check(motion, ARM, mode=mode, distance=None).violations}
+def test_a_target_beyond_a_bound_has_the_code_of_the_client_library(motion, ids, code):
+    found = {v.condition.id: v.condition.fault for v in check(motion, ARM, distance=None).violations}
     assert found[ids] == UfactoryError(code)
 
 

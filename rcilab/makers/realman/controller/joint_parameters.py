@@ -88,10 +88,13 @@ class JointParameters:
                 raise InvalidValueError(name, value, f"must be above 0, up to {bound}")
         else:
             low, high = self.factory.min_pos[index], self.factory.max_pos[index]
-            other = before.max_pos[index] if name == "min_pos" else before.min_pos[index]
-            is_ordered = value < other if name == "min_pos" else other < value
-            if not (low <= value <= high and is_ordered):
-                raise InvalidValueError(name, value, f"must be {low} to {high}, with min_pos below max_pos")
+            if name == "min_pos":
+                high = min(self.controller.max_pos[index], self.drive.max_pos[index]) - 1
+            else:
+                low = max(self.controller.min_pos[index], self.drive.min_pos[index]) + 1
+            if not low <= value <= high:
+                problem = f"must be {low} to {high}, so that controller and drive leave a range"
+                raise InvalidValueError(name, value, problem)
         values: tuple[int, ...] = getattr(before, name)
         after = replace(before, **{name: (*values[:index], value, *values[joint:])})
         return replace(self, drive=after) if is_drive else replace(self, controller=after)

@@ -177,18 +177,12 @@ def _movel_offset(controller: RealManController, request: Request, peer: Peer) -
 
 
 def _offset_target(controller: RealManController, offset: Pose, speed: ToolSpeed, *, in_tool: bool) -> LineTarget:
-    """Returns a line by an offset in the axes of the tool, or of the work frame from the present pose."""
+    """Returns a line by an offset from the end of the queue, in the axes of the tool or of the work frame."""
     number = controller.trajectories.next_id()
     if in_tool:
         return LineTarget(id=number, pose=offset, frame="tool", speed=speed)
-    if controller.drive.planner.state is PlannerState.MOVING:
-        raise UsageError("the offset in the work frame is not possible while the arm moves")
-    T_base_work = controller.settings.T_base_work
-    T_work_tool = controller.T_work_tool
-    turned = Pose.from_parts(offset.parts[0], (0.0, 0.0, 0.0)) @ Pose.from_parts(T_work_tool.parts[0], (0.0, 0.0, 0.0))
-    position = T_work_tool.position + offset.position
-    pose = T_base_work @ Pose.from_parts(turned.parts[0], (float(position[0]), float(position[1]), float(position[2])))
-    return LineTarget(id=number, pose=pose, speed=speed)
+    R_base_work = Pose.from_parts(controller.settings.T_base_work.parts[0], (0.0, 0.0, 0.0))
+    return LineTarget(id=number, pose=R_base_work @ offset @ R_base_work.inverse(), frame="offset", speed=speed)
 
 
 def _movec(controller: RealManController, request: Request, peer: Peer) -> None:
@@ -226,9 +220,10 @@ def _joint_step(controller: RealManController, request: Request, peer: Peer) -> 
     joint, step = request.integers("joint_step", 2)
     index = require_joint(joint, controller.model.n) - 1
     (angle,) = angles_from_millidegrees((step,))
-    q = np.array(controller.drive.q_c)
-    q[index] += angle
-    _require_inside(controller, q.tolist(), controller.limits)
+    end = controller.drive.planner.end_q
+    if end is not None and not controller.trajectories.is_connecting(peer):  # Otherwise the planner checks it.
+        end[index] += angle
+        _require_inside(controller, end, controller.limits)
     target = JointTarget(
         id=controller.trajectories.next_id(),
         q=tuple(angle if i == index else 0.0 for i in range(controller.model.n)),
@@ -329,7 +324,7 @@ def _delete_current(controller: RealManController, request: Request) -> None:
 
 def _delete_all(controller: RealManController, request: Request) -> None:
     _require_paused(controller)
-    controller.trajectories.clear()
+    controller.discard_waiting()
     controller.drive.planner.clear_queue()
     controller.drive.planner.skip()
 

@@ -362,21 +362,28 @@ class RealManController:
     def add_all(self, targets: list[Target]) -> None:
         """Passes targets to the planner."""
         if targets:
+            if self.is_teaching:
+                self.drive.planner.end()
             self.streamed, self.is_teaching, self.program = "", False, None
         for target in targets:
             self.drive.planner.add(target)
 
     def slow_stop(self) -> None:
         """Stops on the path, and discards all trajectories."""
-        self.trajectories.clear()
+        self.discard_waiting()
         self.drive.planner.end()
         self.streamed, self.is_teaching, self.program = "", False, None
 
     def stop_at_once(self) -> None:
         """Stops every joint as fast as its limits allow, and discards all trajectories."""
-        self.trajectories.clear()
+        self.discard_waiting()
         self.drive.planner.stop()
         self.streamed, self.is_teaching, self.program = "", False, None
+
+    def discard_waiting(self) -> None:
+        """Reports the end of the trajectories that wait for others of their chain, and forgets them."""
+        for trajectory in self.trajectories.pop_waiting():
+            self.on_end(trajectory, False, False)
 
     def step(self) -> RobotState:
         """Advances by one cycle and returns the state at its end."""
@@ -444,10 +451,10 @@ class RealManController:
     def _end_all(self) -> None:
         """Reports the end of every trajectory that a fault has discarded."""
         self.streamed, self.is_teaching, self.program = "", False, None
-        self.trajectories.clear()
         self._report_arrivals()
         for trajectory in self.trajectories.pop_all():
             self.on_end(trajectory, False, False)
+        self.discard_waiting()
 
     def _fail(self, error: RealManError, reason: Remark) -> None:
         self.set_error(error, reason)

@@ -181,6 +181,7 @@ class RealManServer:
         except UsageError as error:
             text = f"{request.command} was refused: {error}"
             self._link.log("refused", text, request=request.command, status="REFUSED")
+            self._answer(peer, {"command": request.command, "get_state": False})
 
     def _announce_file(self, peer: Peer, request: Request) -> None:
         is_taken = True
@@ -195,6 +196,7 @@ class RealManServer:
 
     def _stream(self, request: Request) -> None:
         try:
+            self.controller.require_ready()
             STREAMS[request.command](self.controller, request)
         except UsageError:
             self.controller.ignored += 1

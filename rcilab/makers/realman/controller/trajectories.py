@@ -34,7 +34,7 @@ class TrajectoryQueue:
         self._number = 0
         self._known: dict[int, Trajectory] = {}
         self._waiting = defaultdict[Peer | None, list[tuple[Target, Trajectory]]](list)
-        self._splines = defaultdict[Peer | None, list[Pose]](list)
+        self._splines = defaultdict[Peer | None, list[tuple[Pose, Trajectory]]](list)
 
     def next_id(self) -> int:
         """Returns the number of the next target."""
@@ -54,6 +54,10 @@ class TrajectoryQueue:
         known, self._known = list(self._known.values()), {}
         return known
 
+    def is_connecting(self, peer: Peer | None) -> bool:
+        """Returns whether a client has commanded targets that wait for others of their chain."""
+        return peer in self._waiting or peer in self._splines
+
     def add(self, target: Target, trajectory: Trajectory) -> list[Target]:
         """Adds a target; returns those that are planned now: none as long as its client is to connect another one."""
         self._waiting[trajectory.peer].append((target, trajectory))
@@ -66,10 +70,10 @@ class TrajectoryQueue:
 
     def add_spline(self, pose: Pose, speed: ToolSpeed, trajectory: Trajectory) -> list[Target]:
         """Adds a pose of a spline; the last one completes it. Fewer than three are reached on straight lines."""
-        self._splines[trajectory.peer].append(pose)
+        self._splines[trajectory.peer].append((pose, trajectory))
         if trajectory.is_followed_by_another:
             return []
-        poses = tuple(self._splines.pop(trajectory.peer))
+        poses = tuple(pose for pose, _ in self._splines.pop(trajectory.peer))
         if len(poses) >= FEWEST_SPLINE_POSES:
             spline = SplineTarget(id=self.next_id(), poses=poses, speed=speed)
             return self.add(spline, replace(trajectory, commands=len(poses)))
@@ -78,10 +82,12 @@ class TrajectoryQueue:
             self.add(line, replace(trajectory, is_followed_by_another=True))
         return self.add(LineTarget(id=self.next_id(), pose=pose, speed=speed), trajectory)
 
-    def clear(self) -> None:
-        """Forgets all that wait."""
+    def pop_waiting(self) -> list[Trajectory]:
+        """Returns the trajectories that wait for others of their chain, and forgets them."""
+        parts = (*self._waiting.values(), *self._splines.values())
         self._waiting.clear()
         self._splines.clear()
+        return [trajectory for part in parts for _, trajectory in part]
 
     def forget(self, peer: Peer) -> None:
         """Forgets what waits of a client that has left."""

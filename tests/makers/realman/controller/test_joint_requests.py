@@ -52,7 +52,7 @@ def test_a_value_of_a_disabled_joint_is_set_and_read_back_and_the_joint_stays_di
         ("max_speed", 0, "above 0"),
         ("max_acc", 500001, "up to 500000"),
         ("min_pos", -130001, "must be -130000"),
-        ("max_pos", -130000, "with min_pos below max_pos"),
+        ("max_pos", -130000, "leave a range"),
         ("max_pos", 2**40, "integer of 32 bits"),
         ("max_speed", "fast", "integer of 32 bits"),
     ],
@@ -92,6 +92,16 @@ def test_a_ratio_of_acceleration_to_speed_below_the_recommended_one_is_set_with_
     assert bench.ask("set_joint_max_acc", joint_max_acc=[2, 40000])["joint_max_acc"] is True
     assert bench.logged[-1][0] == "warning"
     assert "1.33" in bench.logged[-1][1]
+
+
+@pytest.mark.parametrize(("first", "second"), [("", "drive_"), ("drive_", "")])
+def test_controller_and_drive_leave_a_range(first, second):
+    bench = Bench()
+    bench.ask("set_joint_en_state", joint_en_state=[1, 0])
+    assert bench.ask(f"set_joint_{first}max_pos", joint_max_pos=[1, 50000])["joint_max_pos"] is True
+    for value, taken in ((100000, False), (50000, False), (49999, True)):
+        assert bench.ask(f"set_joint_{second}min_pos", joint_min_pos=[1, value])["joint_min_pos"] is taken
+    assert bench.ask(f"set_joint_{first}max_pos", joint_max_pos=[1, 49999])["joint_max_pos"] is False
 
 
 def test_the_ranges_of_the_specification_come_back_at_once():
