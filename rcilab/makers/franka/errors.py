@@ -72,7 +72,7 @@ class FrankaError(FaultCode):
 
 
 _CAUSES = {
-    FrankaError.JOINT_POSITION_LIMITS_VIOLATION: "a measured joint angle left its range",
+    FrankaError.JOINT_POSITION_LIMITS_VIOLATION: "a joint angle left its range",
     FrankaError.CARTESIAN_POSITION_LIMITS_VIOLATION: "the tool left its allowed space",
     FrankaError.SELF_COLLISION_AVOIDANCE_VIOLATION: "the arm came close to a self-collision",
     FrankaError.JOINT_VELOCITY_VIOLATION: "a measured joint velocity was too high",
