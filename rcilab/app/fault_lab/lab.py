@@ -132,7 +132,7 @@ class FaultLab(Closeable):
         progress(_SHOWN)
         lost = min(status.lost, LOST_COMMANDS_THRESHOLD)  # A controller that holds commands counts late ones, too.
         signals = Signals(rows, self.model, scene.limits, scene.box, lost)
-        signal = signals.find(scenario.fault) or signals.reported(scenario.fault, status.reason)
+        signal = signals.find(scenario.fault, status.reason) or signals.reported(scenario.fault, status.reason)
         if signal is None:
             raise RcilabError(
                 f"{scenario.fault.manual_name}: the record does not show what the controller saw: {status.reason}"

@@ -8,7 +8,7 @@ after such a gap is not known (NaN).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,11 @@ class FaultSignal:
         return int(np.isfinite(self.values).sum()) > 1
 
     @property
+    def is_sensed(self) -> bool:
+        """Whether it is measured, or estimated from measurements."""
+        return self.condition.is_measured or self.condition.signal == "external_torque"
+
+    @property
     def is_broken(self) -> bool:
         """Whether the last value is outside its bounds; False if it is not known."""
         return bool(self.value <= self.lower[-1] or self.value >= self.upper[-1])
@@ -97,11 +102,22 @@ class Signals:
         self._table = condition_table(model.description)
         self._period = CYCLE_TIME * state_cycles(rows)
 
-    def find(self, fault: FaultCode) -> FaultSignal | None:
-        """Returns the signal that raised a fault: the one farthest beyond its bound in the last row."""
+    def find(self, fault: FaultCode, reason: str) -> FaultSignal | None:
+        """Returns the signal that raised a fault: the one farthest beyond its bound in the last row.
+
+        Args:
+            fault: The fault.
+            reason: The controller's sentence. Of a measured signal it has the value: the last row may be of a later
+                cycle.
+        """
         rows = self._table.raising(fault)
         found = [signal for row in rows for signal in self._signals(row) if signal.is_broken]
-        return max(found, key=lambda signal: signal.excess, default=None)
+        signal = max(found, key=lambda signal: signal.excess, default=None)
+        facts = reason.facts if isinstance(reason, Remark) else {}
+        if signal is None or not signal.is_sensed or "value" not in facts or facts.get("joint", 0) != signal.axis:
+            return signal
+        seen = math.copysign(float(facts["value"]), signal.value)  # type: ignore[arg-type]
+        return replace(signal, values=np.append(signal.values[:-1], seen))
 
     def reported(self, fault: FaultCode, reason: str) -> FaultSignal | None:
         """Returns the signal of a fault for which the record has no values: the last one is that of the controller.

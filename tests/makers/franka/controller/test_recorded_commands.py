@@ -132,6 +132,28 @@ def test_a_motion_ran_to_its_end_only_with_a_last_command(
     ring.close()
 
 
+def test_the_reason_of_a_stop_outlives_a_recovery_that_comes_before_the_arm_stands() -> None:
+    controller, capture, motions, ring = recorded("FR3", VERSION_10)
+    start = tuple(controller.state.q_c.tolist())
+    assert controller.begin_move(AsyncMove(0, 1, DEVIATION, DEVIATION, False, (0.5,) * 7)) is Status.MOTION_STARTED
+    controller.step()
+    capture.write()
+    for size in (*(0.005 * k for k in range(100)), 3.0):
+        controller.receive(packet(controller.cycle_number, 1, size, start, is_last=False))
+        controller.step()
+        capture.write()
+    assert controller.faults
+    assert controller.begin_recovery() is None
+    assert not controller.arm.commanded.is_stationary
+    for _ in range(200):
+        controller.step()
+        capture.write()
+    assert not controller.faults
+    (end,) = [part.end for part in motions.poll(is_last=True) if part.end is not None]
+    assert "joint 7: commanded" in (end.stopped or "")
+    ring.close()
+
+
 JUMP, NO_NUMBER = 0.05, float("nan")
 E = FrankaError
 STOPPED = [
