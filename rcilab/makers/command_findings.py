@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 _INVERTED = 100  # Number of last poses whose joint angles are computed: more than there are on the wire.
 _FOLLOWED = 10  # Cycles before the fault in which the joint nearest to a bound is searched.
+_LATE = 0.02  # [s] Without a command: a few periods of any interface.
+_LAST = 20  # Commands before the fault between which a pause is searched.
 _HISTORY = 3  # Commands before a command that its third difference uses.
 _RATES = {1: ("velocity", "rad/s"), 2: ("acceleration", "rad/s^2"), 3: ("jerk", "rad/s^3")}
 
@@ -144,6 +146,17 @@ def find_lost_commands(record: NDArray[np.void]) -> str:
         return ""
     share = f"{100.0 * (1.0 - rate):.2g}"
     return Remark(f"{share} % of the last second's commands did not arrive in time", "late_commands", share=share)
+
+
+def find_pause(record: NDArray[np.void]) -> str:
+    """Returns that no command was sent for some time shortly before the end, and for how long; "" if there were all."""
+    sent = record["sent_ns"][record["sent_ns"] > 0][-_LAST:]
+    gap = 1e-9 * float(np.diff(sent).max()) if len(sent) > 1 else 0.0
+    if gap < _LATE:
+        return ""
+    time = f"{1e3 * gap:.0f}"
+    sentence = f"shortly before, no command was sent for {time} ms: a callback took long, or the machine was busy"
+    return Remark(sentence, "client_paused", time=time)
 
 
 def _throughout(rows: Sequence[Condition], *signals: Signal) -> tuple[Condition, ...]:

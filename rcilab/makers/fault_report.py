@@ -15,14 +15,13 @@ from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode
 from rcilab.i18n.translator import Remark
+from rcilab.makers.command_findings import find_pause
 from rcilab.makers.driver import FaultReport
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
 _HELD = "error.run holds the motion"
-_LATE = 0.02  # [s] Without a command: a few periods of any interface.
-_LAST = 20  # Commands before the fault that are looked at.
 
 
 def describe_faults(
@@ -43,19 +42,6 @@ def describe_faults(
     if pressed:
         return FaultReport(f"the controller stopped the motion {when}: {pressed}", _HELD, Remark(""))
     found = ", ".join(f"{fault.manual_name} ({fault.cause}). {fault.remedy}" for fault in faults)
-    return FaultReport(
-        f"the controller stopped the motion {when}: {found}{_describe_gap(record)}",
-        f"recover() clears the error; {_HELD}",
-        Remark(""),
-    )
-
-
-def _describe_gap(record: NDArray[np.void]) -> str:
-    """Returns that a client was late, and by how much; "" if it was not."""
-    sent = record["sent_ns"][record["sent_ns"] > 0][-_LAST:]
-    gap = 1e-9 * float(np.diff(sent).max()) if len(sent) > 1 else 0.0
-    if gap < _LATE:
-        return ""
-    return (
-        f". Shortly before, no command was sent for {1e3 * gap:.0f} ms: a callback took long, or the machine was busy"
-    )
+    pause = find_pause(record)
+    parts = filter(None, (f"the controller stopped the motion {when}: {found}", pause))
+    return FaultReport("; ".join(parts), f"recover() clears the error; {_HELD}", Remark.all(filter(None, (pause,))))

@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode
 from rcilab.i18n.translator import Remark
-from rcilab.makers.command_findings import CommandConditions, find_commanded, find_followed, find_lost_commands
+from rcilab.makers.command_findings import (
+    CommandConditions,
+    find_commanded,
+    find_followed,
+    find_lost_commands,
+    find_pause,
+)
 from rcilab.makers.driver import FaultReport
 from rcilab.makers.franka.errors import FrankaError
 
@@ -75,7 +81,7 @@ def describe_faults(
     commanded, is_violated = find_commanded(faults, record, limits, conditions)
     followed = find_followed(faults, record, model, limits, conditions)
     lost = find_lost_commands(record) if FrankaError.COMMUNICATION_CONSTRAINTS_VIOLATION in faults else ""
-    found = [part for part in (commanded, followed, lost) if part]
+    found = [part for part in (commanded, followed, lost, find_pause(record)) if part]
     found += _describe_reflex(faults, record, collisions)
     advice = late or next((_ADVICE[fault] for fault in faults if fault in _ADVICE), "")
     advice = advice or (_OF_JOINTS if followed and not is_violated else _SMOOTHNESS)
