@@ -78,7 +78,6 @@ class CycleCapture:
         "_count",
         "_counters",
         "_describe",
-        "_fault_reason",
         "_fields_of",
         "_guests",
         "_has_played",
@@ -98,6 +97,7 @@ class CycleCapture:
         "_offset",
         "_offsets",
         "_playout",
+        "_reason",
         "_received",
         "_ring",
         "_rows",
@@ -125,7 +125,7 @@ class CycleCapture:
         self._is_moving = False
         self._client = ""
         self._lost_client = ""
-        self._fault_reason = Remark("")  # Of a fault of this motion, which the client may clear before its end.
+        self._reason = Remark("")  # Why the arm stops, also if that is over before it has stopped.
         self._rows: dict[int, int] = {}  # Row of each recent message id since the end of the last motion.
         self._commands: dict[int, int] = {}  # Row of each queued command, by its identity.
         self._waiting: deque[_Arrival] = deque(maxlen=_LONGEST_QUEUE)  # For rows to come; drops the oldest.
@@ -310,6 +310,8 @@ class CycleCapture:
 
     def _follow_motion(self, state: RobotState, is_following: bool) -> None:
         """Writes the event of a motion that begins or has ended."""
+        if self._is_moving and (self._controller.faults or self._controller.button != "none"):
+            self._reason = self._controller.reason
         is_moving = is_following or (self._is_moving and self._controller.is_moving)
         if is_moving is self._is_moving:
             return
@@ -321,8 +323,7 @@ class CycleCapture:
 
     def _begin_motion(self, state: RobotState) -> None:
         self._motion += 1
-        self._lost_client = ""
-        self._fault_reason = Remark("")
+        self._lost_client, self._reason = "", Remark("")
         arm, load = self._arm, self._arm.model.load
         self._ring.add_event(
             {
@@ -340,10 +341,8 @@ class CycleCapture:
         )
 
     def _end_motion(self) -> None:
-        controller, playout = self._controller, self._playout
-        has_reason = controller.faults or controller.button != "none"
-        before = self._fault_reason or Remark(self._lost_client)
-        reason = controller.reason if has_reason else before or self._describe_break()
+        playout = self._playout
+        reason = self._reason or Remark(self._lost_client) or self._describe_break()
         self._ring.add_event(
             {
                 "event": "end",
@@ -393,8 +392,6 @@ class CycleCapture:
         modes = state.faults, state.robot_mode, state.controller_mode, state.motion_generator_mode
         if modes != self._modes:
             self._modes = modes
-            if state.faults:
-                self._fault_reason = self._controller.reason
             self._status = _FAULTS.pack(sum(1 << fault for fault in state.faults), 0, *modes[1:], 0)
         (
             number, success_rate, q, q_c, dq, tau, ext, ext_stiff, theta, dq_c, ddq_c, velocity_c, acceleration_c,

@@ -154,6 +154,29 @@ def test_the_reason_of_a_stop_outlives_a_recovery_that_comes_before_the_arm_stan
     ring.close()
 
 
+def test_a_user_stop_that_is_released_before_the_arm_has_stopped_ended_the_motion() -> None:
+    controller, capture, motions, ring = recorded("FR3", VERSION_10)
+    start = tuple(controller.state.q_c.tolist())
+    assert controller.begin_move(AsyncMove(0, 1, DEVIATION, DEVIATION, False, (0.5,) * 7)) is Status.MOTION_STARTED
+    for k in range(100):
+        controller.receive(packet(controller.cycle_number, 1, 1e-3 * k, start, is_last=False))
+        controller.step()
+        capture.write()
+    for button in ("estop", "none"):
+        controller.press_button(button)
+        controller.step()
+        capture.write()
+    assert controller.is_moving
+    while controller.is_moving:
+        controller.step()
+        capture.write()
+    controller.step()
+    capture.write()
+    (end,) = [part.end for part in motions.poll(is_last=True) if part.end is not None]
+    assert end.stopped == "the user stop was pressed"
+    ring.close()
+
+
 JUMP, NO_NUMBER = 0.05, float("nan")
 E = FrankaError
 STOPPED = [
