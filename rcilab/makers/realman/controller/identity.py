@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import degrees
-from typing import Final, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 from rcilab.core.errors import InvalidValueError
 from rcilab.makers.realman.wire.identity import product_version
@@ -46,7 +46,7 @@ def software_info(name: str, generation: Generation) -> dict[str, object]:
     return info
 
 
-def dh_data(description: RobotDescription) -> dict[str, object]:
+def dh_data(description: RobotDescription) -> dict[str, Any]:
     """Returns the answer to get_DH_data: alpha, a, d and offset a joint, in 0.001 deg and 0.000001 m."""
     rows = list(description.dh)
     if description.name not in _STANDARD:  # In Craig's convention alpha and a belong to the row after.

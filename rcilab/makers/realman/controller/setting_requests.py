@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.makers.realman.bounds import FASTEST_TOOL, MOST_SENSITIVE, STRONGEST_TOOL
 from rcilab.makers.realman.controller.handler import Getter, Setter, setter
+from rcilab.makers.realman.controller.identity import dh_data
 from rcilab.makers.realman.controller.realman_controller import RealManController
 from rcilab.makers.realman.controller.settings import (
     OUTPUT_MODE,
@@ -24,6 +25,7 @@ T = TypeVar("T")
 
 _MILLI = 1e-3
 _LONGEST_CYCLE = 1000  # [5 ms]
+_LONGEST_PERIOD = 1000  # [ms]
 _LAST_MODE = 14
 _SPEED_MODE = 14
 _VOLTAGES = (0, 2, 3)  # 0 V, 12 V, 24 V.
@@ -199,6 +201,19 @@ def _push(controller: RealManController, request: Request) -> dict[str, Any]:
     }
 
 
+def _set_velocity_stream(controller: RealManController, request: Request) -> None:
+    _within(request, "avoid_singularity_flag", 0, 1)  # The arm always slows down near a singularity.
+    _within(request, "dt", 1, _LONGEST_PERIOD)  # Velocities may come at any time.
+    in_tool = _within(request, "frame_type", 0, 1) == 0
+    controller.change(replace(controller.settings, velocity_in_tool=in_tool))
+
+
+def _set_geometry(controller: RealManController, request: Request) -> None:
+    for name, row in dh_data(controller.model.description).items():
+        if name != "command" and list(request.integers(name, len(row))) != row:
+            raise InvalidValueError(name, request.fields[name], f"must be {row}: the virtual arm keeps its geometry")
+
+
 def _accept(controller: RealManController, request: Request) -> None:
     del controller, request
 
@@ -227,6 +242,9 @@ SETTERS: dict[str, Setter] = {
     "set_tool_DO_state": setter("set_state", _set_tool_output),
     "set_tool_voltage": _voltage_setter("tool_voltage", _TOOL_VOLTAGES),
     "set_realtime_push": setter("state", _set_push),
+    "set_movev_canfd_init": setter("movev_canfd_init_state", _set_velocity_stream),
+    "set_DH_data": setter("set_state", _set_geometry),
+    "set_DH_data_default": setter("set_state", _accept),
 }
 GETTERS: dict[str, Getter] = {
     **{f"get_arm_max_{name}": _tip_getter(name) for name in _TIPS},

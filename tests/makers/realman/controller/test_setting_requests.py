@@ -44,3 +44,25 @@ def test_a_voltage_is_read_back(kind: str, refused: int):
     assert bench.ask(f"set_{kind}", voltage_type=3)["state"] is True
     assert bench.ask(f"set_{kind}", voltage_type=refused)["state"] is False
     assert bench.ask(f"get_{kind}") == {"state": f"{kind}_state", "voltage_type": 3}
+
+
+def test_streamed_velocities_are_in_the_axes_that_were_set():
+    bench = Bench("RM75")
+    for frame, moves_down in ((1, False), (0, True)):  # Work frame, tool: its z axis points down.
+        fields = {"avoid_singularity_flag": 0, "frame_type": frame, "dt": 10}
+        assert bench.ask("set_movev_canfd_init", **fields)["movev_canfd_init_state"] is True
+        before = bench.pose[2]
+        for _ in range(20):
+            bench.send("movev_canfd", cartesian_velocity=[0, 0, 50000, 0, 0, 0])
+            bench.run(10)
+        assert (bench.pose[2] < before) is moves_down
+        bench.run(500)
+    assert bench.ask("set_movev_canfd_init", frame_type=2)["movev_canfd_init_state"] is False
+
+
+def test_the_geometry_is_that_of_the_arm():
+    bench = Bench("RM75")
+    rows = {name: row for name, row in bench.ask("get_DH_data").items() if name != "command"}
+    assert bench.ask("set_DH_data", **rows)["set_state"] is True
+    assert bench.ask("set_DH_data", **{**rows, "joint_1": [-90000, 0, 250000, 0]})["set_state"] is False
+    assert bench.ask("set_DH_data_default")["set_state"] is True
