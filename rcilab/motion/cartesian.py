@@ -257,7 +257,7 @@ def arm_angles(
     if not abs(requested) <= math.pi:
         raise InvalidValueError("psi", psi, "must be from -pi to pi [rad]").coded("span", low="-pi", high="pi")
     joint = model.redundancy.joint
-    if joint is not None:
+    if joint is not None and psi is not None:
         low, high = (float(bound[joint - 1]) for bound in (model.limits.joint.lower, model.limits.joint.upper))
         if not low <= requested <= high:
             problem = f"is the angle of joint {joint} and must be from {low:g} to {high:g} [rad]"
