@@ -5,7 +5,7 @@ Values that every maker understands; for None, the controller keeps its own.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Literal, TypeAlias
@@ -168,14 +168,33 @@ def require_setup(setup: object) -> RobotConfiguration:
     )
 
 
-def require_control(control: object) -> ControllerParameters:
-    """Returns `control` if it is a ControllerParameters.
+def send_groups(control: object, requests: Mapping[str, Callable[[tuple[float, ...]], None]]) -> None:
+    """Sends each group of parameters by its request, in the order of the requests.
+
+    Args:
+        control: The parameters, a `ControllerParameters`.
+        requests: The request of each group that the controller has, called with the values of the group.
 
     Raises:
-        InvalidValueError: It is not a ControllerParameters.
+        InvalidValueError: It is not a ControllerParameters, or the controller has no such group; nothing was sent.
     """
-    if isinstance(control, ControllerParameters):
-        return control
-    raise InvalidValueError(
-        "control", control, "is not a ControllerParameters; ControllerParameters(joint_stiffness=...) makes some"
-    )
+    if not isinstance(control, ControllerParameters):
+        problem = "is not a ControllerParameters; ControllerParameters(joint_stiffness=...) makes some"
+        raise InvalidValueError("control", control, problem)
+    unknown = control.keys() - requests
+    if unknown:
+        raise InvalidValueError("control", sorted(unknown), f"does not exist; known: {', '.join(requests)}")
+    for name, send in requests.items():
+        if name in control:
+            send(control[name])
+
+
+def as_whole(name: str, value: float, most: int) -> int:
+    """Returns a parameter that has whole numbers from 0 to `most`.
+
+    Raises:
+        InvalidValueError: It is not one.
+    """
+    if value not in range(most + 1):
+        raise InvalidValueError(name, value, f"must be a whole number from 0 to {most}")
+    return round(value)

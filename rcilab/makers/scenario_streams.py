@@ -9,13 +9,15 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import Array, readonly_copy
+from rcilab.core.arrays import Array, JointVector, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.command import CartesianPosition, JointPosition, JointTorque
+from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
 from rcilab.makers.scenario import Callback, Scene
+from rcilab.motion import plan_joint
 from rcilab.sim.api import NetworkFaults
 
 PAUSE = 20
@@ -25,6 +27,9 @@ LONGEST = 3000
 
 _STEP = 5  # [cycles] Interval at which a growing push is sent to the simulation.
 _CUT = 40  # [cycles] After which the network is cut.
+_NARROW = 0.05  # [rad] From the start of the last joint to the end of its narrower range.
+_AWAY = 1.2  # [rad] Of joint 1, by which the tool is far from its start.
+_FREE = 0.5  # [s] Of a motion until a blow.
 
 Push: TypeAlias = Callable[[int], tuple[float, ...]]
 """Wrench on the tool by the cycle since the start of the push: force and moment, base axes, [N, N m]."""
@@ -84,6 +89,51 @@ def torque_stream(n: int, joint: int, tau: Array) -> Callback:
 def spin(value: float) -> tuple[Array, Array]:
     """About the tool's own axis: the last joint alone, so that the tool's bounds are exceeded before any joint's."""
     return np.zeros(3), np.array([0.0, 0.0, value])
+
+
+def planned(scene: Scene, goal: ArrayLike, speed: float) -> Callback:
+    """Returns a callback that follows a correct plan to joint angles, shape (n,), [rad], at a share of the speed."""
+    rows = plan_joint(scene.robot.model, scene.start.q_c, goal, speed=speed).q
+
+    def callback(state: RobotState, t: float) -> JointPosition:
+        cycle = round(t / CYCLE_TIME)
+        return JointPosition(readonly_copy(rows[min(cycle, len(rows) - 1)]), finished=cycle >= len(rows))
+
+    return callback
+
+
+def turned(scene: Scene) -> JointVector:
+    """Returns the start with joint 1 turned, so that the tool is far from its start."""
+    q = np.array(scene.start.q_c)
+    q[0] += _AWAY
+    return readonly_copy(q)
+
+
+def last_joint_narrowed(scene: Scene) -> Scene:
+    """Returns the scene with a range of the last joint that ends next to its start, set by the maker's own request."""
+    joint = scene.robot.model.limits.joint
+    upper = np.array(joint.upper)
+    upper[-1] = scene.start.q_c[-1] + _NARROW
+    scene.commands.set_joint_ranges(joint.lower, upper)
+    return scene.narrowed(readonly_copy(upper))
+
+
+def over_the_end(scene: Scene) -> Callback:
+    """Returns a callback that moves the last joint over the end of its range."""
+    return joint_stream(scene.start.q_c, scene.robot.model.n - 1, path(rise(0.01, 0.2, 1200)))
+
+
+def struck(scene: Scene, force: float, speed: float) -> Callback:
+    """Returns a callback that turns joint 1 by a plan, during which a blow, [N], comes against the motion."""
+    move = planned(scene, turned(scene), speed)
+    pending = [(0.0, -force, 0.0, 0.0, 0.0, 0.0)]
+
+    def callback(state: RobotState, t: float) -> Command:
+        if pending and t > _FREE:
+            scene.robot.simulation.push(pending.pop(), rise_time=0.0)
+        return move(state, t)
+
+    return callback
 
 
 def held(scene: Scene, act: Callable[[int], None], *, tool: bool) -> Callback:

@@ -14,14 +14,24 @@ import numpy as np
 
 from rcilab.core.arrays import Array, JointVector, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.command import CartesianPosition, JointPosition
+from rcilab.core.command import CartesianPosition
 from rcilab.core.state import Mode, RobotState
 from rcilab.makers.franka.bounds import LARGEST_THRESHOLD
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.scenario import Callback, FaultScenario, Group, Scene
-from rcilab.makers.scenario_streams import LONGEST, PAUSE, cut_off, joint_stream, path, pushed, rise, torque_stream
+from rcilab.makers.scenario_streams import (
+    LONGEST,
+    PAUSE,
+    cut_off,
+    joint_stream,
+    over_the_end,
+    path,
+    planned,
+    pushed,
+    rise,
+    torque_stream,
+)
 from rcilab.model.robot_model import RobotModel
-from rcilab.motion import plan_joint
 
 _NEAR_END = 0.02  # [rad] From the end of the range of joint 7.
 _PAST = 1.01  # Factor on the bound: beyond it by more than the rounding of single precision.
@@ -80,23 +90,13 @@ def _elbow_jump(scene: Scene) -> Callback:
     return _pose_stream(scene, 0, np.zeros(60), elbow=np.where(np.arange(60) < PAUSE, 0.0, 0.3))
 
 
-def _over_the_end(scene: Scene) -> Callback:
-    return joint_stream(scene.start.q_c, _LAST, path(rise(0.01, 0.2, 1200)))
-
-
 def _pose_over_the_end(scene: Scene) -> Callback:
     return _pose_stream(scene, _LAST, path(rise(0.01, 0.2, 1200)))
 
 
 def _fold(scene: Scene) -> Callback:
     """Goes on a correct path to a pose in which the wrist would be in the base."""
-    rows = plan_joint(scene.robot.model, scene.start.q_c, _FOLDED[scene.robot.model.name], speed=0.3).q
-
-    def callback(state: RobotState, t: float) -> JointPosition:
-        cycle = round(t / CYCLE_TIME)
-        return JointPosition(readonly_copy(rows[min(cycle, len(rows) - 1)]), finished=cycle >= len(rows))
-
-    return callback
+    return planned(scene, _FOLDED[scene.robot.model.name], 0.3)
 
 
 def _joint_velocity(scene: Scene) -> Callback:
@@ -215,7 +215,7 @@ _COMMON = (
 _ONLY = {
     "Panda": (
         _command(
-            FrankaError.JOINT_MOTION_GENERATOR_POSITION_LIMITS_VIOLATION, "position", _over_the_end, _near_the_end
+            FrankaError.JOINT_MOTION_GENERATOR_POSITION_LIMITS_VIOLATION, "position", over_the_end, _near_the_end
         ),
         _command(
             FrankaError.CARTESIAN_MOTION_GENERATOR_JOINT_POSITION_LIMITS_VIOLATION, "position", _pose_over_the_end,
@@ -232,7 +232,7 @@ _ONLY = {
     ),
     "FR3": (
         _command(
-            FrankaError.JOINT_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION, "velocity", _over_the_end, _near_the_end
+            FrankaError.JOINT_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION, "velocity", over_the_end, _near_the_end
         ),
     ),
 }  # fmt: skip

@@ -13,28 +13,30 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import JointVector, readonly_copy
+from rcilab.core.arrays import readonly_copy
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.command import Command, JointPosition
 from rcilab.core.fault import FaultCode
-from rcilab.core.state import RobotState
 from rcilab.makers.realman.bounds import LARGEST_STREAM_STEP, MOST_SENSITIVE, SPEED_ALLOWANCE
 from rcilab.makers.realman.errors import RealManError, errors_of_codes
 from rcilab.makers.realman.wire.units import pose_for_client
 from rcilab.makers.scenario import Callback, FaultScenario, Group, Scene
-from rcilab.makers.scenario_streams import PAUSE, joint_stream, path, rise
-from rcilab.motion import plan_joint
+from rcilab.makers.scenario_streams import (
+    PAUSE,
+    joint_stream,
+    last_joint_narrowed,
+    over_the_end,
+    path,
+    planned,
+    struck,
+    turned,
+)
 
-_NARROW = 0.05  # [rad] From the start of the last joint to the end of its narrower range.
-_AWAY = 1.2  # [rad] Of joint 1: the tool leaves the fence.
 _SLACK = 0.15  # [m] From the tool to the side of the fence.
 _FAR = 2.0  # [m] To its other sides, which no link reaches.
 _SLOW = 0.4  # [rad/s] Largest speed that joint 1 gets.
 _TOO_FAST = 1.5  # Of the speed at which a joint is too fast.
 _JUMP = 1.2  # Of the largest step.
-_FREE = 0.5  # [s] Of the motion until the push begins.
 _PUSH = 60.0  # [N]
 _UNREACHABLE = 3.0  # [m] Length that no arm has.
 _PERCENT = 10  # Speed of motions, which do not begin.
@@ -52,35 +54,13 @@ _FOLDED_DEG = {
 """Inside every range, with the last links in the first ones."""
 
 
-def _planned(scene: Scene, goal: ArrayLike, speed: float) -> Callback:
-    rows = plan_joint(scene.robot.model, scene.start.q_c, goal, speed=speed).q
-
-    def callback(state: RobotState, t: float) -> JointPosition:
-        cycle = round(t / CYCLE_TIME)
-        return JointPosition(readonly_copy(rows[min(cycle, len(rows) - 1)]), finished=cycle >= len(rows))
-
-    return callback
-
-
-def _narrowed(scene: Scene) -> Scene:
-    joint = scene.robot.model.limits.joint
-    upper = np.array(joint.upper)
-    upper[-1] = scene.start.q_c[-1] + _NARROW
-    scene.commands.set_joint_ranges(joint.lower, upper)
-    return scene.narrowed(readonly_copy(upper))
-
-
-def _over_the_end(scene: Scene) -> Callback:
-    return joint_stream(scene.start.q_c, scene.robot.model.n - 1, path(rise(0.01, 0.2, 1200)))
-
-
 def _avoiding(scene: Scene) -> Scene:
     scene.commands.set_self_collision(True)
     return scene
 
 
 def _fold(scene: Scene) -> Callback:
-    return _planned(scene, np.radians(_FOLDED_DEG[scene.robot.model.name]), 0.3)
+    return planned(scene, np.radians(_FOLDED_DEG[scene.robot.model.name]), 0.3)
 
 
 def _fenced(scene: Scene) -> Scene:
@@ -99,7 +79,7 @@ def _open(scene: Scene) -> None:
 
 
 def _leave(scene: Scene) -> Callback:
-    return _planned(scene, _turned(scene), 0.15)
+    return planned(scene, turned(scene), 0.15)
 
 
 def _slowed(scene: Scene) -> Scene:
@@ -131,21 +111,7 @@ def _sensitive(scene: Scene) -> Scene:
 
 def _hit(scene: Scene) -> Callback:
     """Pushes the tool back while it moves: the controller compares torques only then."""
-    move = _planned(scene, _turned(scene), 0.1)
-    pending = [(0.0, -_PUSH, 0.0, 0.0, 0.0, 0.0)]
-
-    def callback(state: RobotState, t: float) -> Command:
-        if pending and t > _FREE:
-            scene.robot.simulation.push(pending.pop(), rise_time=0.0)
-        return move(state, t)
-
-    return callback
-
-
-def _turned(scene: Scene) -> JointVector:
-    q = np.array(scene.start.q_c)
-    q[0] += _AWAY
-    return readonly_copy(q)
+    return struck(scene, _PUSH, 0.1)
 
 
 def _reach_too_far(scene: Scene) -> tuple[FaultCode, ...]:
@@ -196,8 +162,8 @@ def _refused(
 
 _SCENARIOS = (
     FaultScenario(
-        fault=RealManError.TARGET_OVER_LIMIT, group="position", mode="joint_position", prepare=_narrowed,
-        act=_over_the_end, is_commanded=True,
+        fault=RealManError.TARGET_OVER_LIMIT, group="position", mode="joint_position", prepare=last_joint_narrowed,
+        act=over_the_end, is_commanded=True,
     ),
     FaultScenario(
         fault=RealManError.SELF_COLLISION, group="position", mode="joint_position", prepare=_avoiding, act=_fold

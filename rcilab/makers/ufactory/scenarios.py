@@ -10,22 +10,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import JointVector, readonly_copy
+from rcilab.core.arrays import readonly_copy
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.command import Command, JointPosition
+from rcilab.core.command import JointPosition
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
 from rcilab.makers.scenario import Callback, FaultScenario, Scene
-from rcilab.makers.scenario_streams import PAUSE, joint_stream, path, rise
+from rcilab.makers.scenario_streams import PAUSE, last_joint_narrowed, over_the_end, planned, struck, turned
 from rcilab.makers.ufactory.bounds import SENSITIVITIES, SENSITIVITY_STEP, SERVO_SPEED_FACTOR
 from rcilab.makers.ufactory.errors import UfactoryError
-from rcilab.motion import plan_joint
 
 _EDGE = 0.3  # [m] Of the boundary around the tool.
-_AWAY = 1.2  # [rad] Of joint 1: the tool leaves the boundary.
 _FOLDED = {
     "xArm5": (0.0, -0.21, 0.14, 1.51, 0.0),
     "xArm6": (0.0, -0.21, 0.14, 0.0, 1.51, 0.0),
@@ -34,25 +31,13 @@ _FOLDED = {
     "850": (0.0, -0.88, 0.0, 0.0, -1.65, 0.0),
 }
 """Inside every range, with the last link in the first or in the base, [rad]."""
-_NARROW = 0.05  # [rad] From the start of a joint to the end of its narrower range.
 _TOO_FAST = 1.8  # Of the largest speed of the tool in servo mode.
 _CHASE = 0.4  # [s] Of these targets.
-_FREE = 0.5  # [s] Of the motion until the push begins.
 _BLOW = 6.0  # Of the threshold of joint 1: at once, so that the record shows it, of which every fifth cycle is one.
 
 
-def _planned(scene: Scene, goal: ArrayLike, speed: float) -> Callback:
-    rows = plan_joint(scene.robot.model, scene.start.q_c, goal, speed=speed).q
-
-    def callback(state: RobotState, t: float) -> JointPosition:
-        cycle = round(t / CYCLE_TIME)
-        return JointPosition(readonly_copy(rows[min(cycle, len(rows) - 1)]), finished=cycle >= len(rows))
-
-    return callback
-
-
 def _fold(scene: Scene) -> Callback:
-    return _planned(scene, _FOLDED[scene.robot.model.name], 0.15)
+    return planned(scene, _FOLDED[scene.robot.model.name], 0.15)
 
 
 def _bounded(scene: Scene) -> Scene:
@@ -62,19 +47,7 @@ def _bounded(scene: Scene) -> Scene:
 
 
 def _leave(scene: Scene) -> Callback:
-    return _planned(scene, scene.start.q_c + _AWAY * _joint_1(scene), 0.2)
-
-
-def _narrowed(scene: Scene) -> Scene:
-    joint = scene.robot.model.limits.joint
-    upper = np.array(joint.upper)
-    upper[-1] = scene.start.q_c[-1] + _NARROW
-    scene.commands.set_joint_ranges(joint.lower, upper)
-    return scene.narrowed(readonly_copy(upper))
-
-
-def _over_the_end(scene: Scene) -> Callback:
-    return joint_stream(scene.start.q_c, scene.robot.model.n - 1, path(rise(0.01, 0.2, 1200)))
+    return planned(scene, turned(scene), 0.2)
 
 
 def _too_fast(scene: Scene) -> Callback:
@@ -101,29 +74,16 @@ def _sensitive(scene: Scene) -> Scene:
 
 def _hit(scene: Scene) -> Callback:
     """Pushes the tool back while it moves: the controller compares torques only then."""
-    move = _planned(scene, scene.start.q_c + _AWAY * _joint_1(scene), 0.1)
     x, y, _ = scene.start.T_base_tool_c.position
-    force = _BLOW * scene.limits.joint.collision_threshold[0] / np.hypot(x, y)
-    pending = [(0.0, -force, 0.0, 0.0, 0.0, 0.0)]
-
-    def callback(state: RobotState, t: float) -> Command:
-        if pending and t > _FREE:
-            scene.robot.simulation.push(pending.pop(), rise_time=0.0)
-        return move(state, t)
-
-    return callback
-
-
-def _joint_1(scene: Scene) -> JointVector:
-    return readonly_copy(np.eye(scene.robot.model.n)[0])
+    return struck(scene, float(_BLOW * scene.limits.joint.collision_threshold[0] / np.hypot(x, y)), 0.1)
 
 
 def scenarios_of(arm: str) -> tuple[FaultScenario, ...]:
     """Returns the scenarios of an arm, by its name, in display order."""
     return (
         FaultScenario(
-            fault=UfactoryError.JOINT_RANGE, group="position", mode="joint_position", prepare=_narrowed,
-            act=_over_the_end, is_commanded=True,
+            fault=UfactoryError.JOINT_RANGE, group="position", mode="joint_position", prepare=last_joint_narrowed,
+            act=over_the_end, is_commanded=True,
         ),
         FaultScenario(
             fault=UfactoryError.SAFETY_BOUNDARY, group="position", mode="joint_position", prepare=_bounded, act=_leave

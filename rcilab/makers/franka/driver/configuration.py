@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from rcilab.core.errors import InvalidValueError
-from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, require_control
+from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, send_groups
 
 if TYPE_CHECKING:
     from rcilab.makers.franka.driver.settings import FciSettings
@@ -29,17 +29,12 @@ def send_parameters(settings: FciSettings, control: ControllerParameters) -> Non
         torques, forces = values[:_JOINTS], values[_JOINTS:]
         settings.set_collision_behavior(torques, torques, forces, forces)
 
-    known = {
+    requests: dict[str, Callable[[tuple[float, ...]], None]] = {
         "joint_stiffness": settings.set_joint_impedance,
         "cartesian_stiffness": settings.set_cartesian_impedance,
         "collision_thresholds": set_thresholds,
     }
-    unknown = require_control(control).keys() - known
-    if unknown:
-        raise InvalidValueError("control", sorted(unknown), f"does not exist; known: {', '.join(known)}")
-    for name, send in known.items():
-        if name in control:
-            send(control[name])
+    send_groups(control, requests)
 
 
 def send_configuration(settings: FciSettings, setup: RobotConfiguration) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from rcilab.core.errors import InvalidValueError
-from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, require_control
+from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, as_whole, send_groups
+from rcilab.makers.realman.bounds import MOST_SENSITIVE
 
 if TYPE_CHECKING:
     from rcilab.makers.realman.driver.settings import RealManSettings
@@ -22,18 +23,15 @@ def send_parameters(settings: RealManSettings, control: ControllerParameters) ->
         InvalidValueError: A number is outside its range, or the collision stage not whole; it was not sent.
         CommandRejectedError: The controller refused; the error names the request.
     """
-    known = {
-        "joint_velocity": lambda *values: settings.set_joint_velocities(values),
-        "joint_acceleration": lambda *values: settings.set_joint_accelerations(values),
-        "tool_limits": settings.set_tool_limits,
-        "collision_stage": lambda value: settings.set_collision_stage(_whole(value)),
+    requests: dict[str, Callable[[tuple[float, ...]], None]] = {
+        "joint_velocity": settings.set_joint_velocities,
+        "joint_acceleration": settings.set_joint_accelerations,
+        "tool_limits": lambda values: settings.set_tool_limits(*values),
+        "collision_stage": lambda values: settings.set_collision_stage(
+            as_whole("collision_stage", values[0], MOST_SENSITIVE)
+        ),
     }
-    unknown = require_control(control).keys() - known
-    if unknown:
-        raise InvalidValueError("control", sorted(unknown), f"does not exist; known: {', '.join(known)}")
-    for name, send in known.items():
-        if name in control:
-            send(*control[name])
+    send_groups(control, requests)
 
 
 def send_configuration(settings: RealManSettings, setup: RobotConfiguration) -> None:
@@ -54,9 +52,3 @@ def send_configuration(settings: RealManSettings, setup: RobotConfiguration) -> 
         settings.set_joint_ranges(setup.joints.lower, setup.joints.upper)
     if setup.control is not None:
         send_parameters(settings, setup.control)
-
-
-def _whole(value: float) -> int:
-    if value != round(value):
-        raise InvalidValueError("collision_stage", value, "must be a whole number from 0 to 8")
-    return round(value)

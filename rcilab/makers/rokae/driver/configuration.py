@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from rcilab.core.errors import InvalidValueError
-from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, require_control
+from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, send_groups
 
 if TYPE_CHECKING:
     from rcilab.makers.rokae.driver.settings import RciSettings
@@ -22,7 +22,7 @@ def send_parameters(settings: RciSettings, control: ControllerParameters) -> Non
         InvalidValueError: A number is outside its range; it was not sent.
         CommandRejectedError: The controller refused; the error names the command.
     """
-    known = {
+    requests: dict[str, Callable[[tuple[float, ...]], None]] = {
         "joint_stiffness": settings.set_joint_impedance,
         "cartesian_stiffness": settings.set_cartesian_impedance,
         "desired_wrench": settings.set_cart_imp_desired_tau,
@@ -30,12 +30,7 @@ def send_parameters(settings: RciSettings, control: ControllerParameters) -> Non
         "filters": lambda values: settings.set_filters(*values),
         "report_filter": lambda values: settings.set_torque_filter_cut_off_frequency(*values),
     }
-    unknown = require_control(control).keys() - known
-    if unknown:
-        raise InvalidValueError("control", sorted(unknown), f"does not exist; known: {', '.join(known)}")
-    for name, send in known.items():
-        if name in control:
-            send(control[name])
+    send_groups(control, requests)
 
 
 def send_configuration(settings: RciSettings, setup: RobotConfiguration) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from rcilab.core.errors import InvalidValueError
-from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, require_control
+from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, as_whole, send_groups
+from rcilab.makers.ufactory.bounds import SENSITIVITIES
 
 if TYPE_CHECKING:
     from rcilab.makers.ufactory.driver.settings import XArmSettings
@@ -22,17 +23,12 @@ def send_parameters(settings: XArmSettings, control: ControllerParameters) -> No
         InvalidValueError: A number is outside its range, or a sensitivity not whole; it was not sent.
         CommandRejectedError: The controller refused; the error names the request.
     """
-    known = {
-        "collision_sensitivity": lambda value: settings.set_collision_sensitivity(_whole(value)),
-        "teach_sensitivity": lambda value: settings.set_teach_sensitivity(_whole(value)),
-        "motion_limits": settings.set_motion_limits,
+    requests: dict[str, Callable[[tuple[float, ...]], None]] = {
+        "collision_sensitivity": lambda values: settings.set_collision_sensitivity(_level(values[0])),
+        "teach_sensitivity": lambda values: settings.set_teach_sensitivity(_level(values[0])),
+        "motion_limits": lambda values: settings.set_motion_limits(*values),
     }
-    unknown = require_control(control).keys() - known
-    if unknown:
-        raise InvalidValueError("control", sorted(unknown), f"does not exist; known: {', '.join(known)}")
-    for name, send in known.items():
-        if name in control:
-            send(*control[name])
+    send_groups(control, requests)
 
 
 def send_configuration(settings: XArmSettings, setup: RobotConfiguration) -> None:
@@ -57,7 +53,5 @@ def send_configuration(settings: XArmSettings, setup: RobotConfiguration) -> Non
         send_parameters(settings, setup.control)
 
 
-def _whole(value: float) -> int:
-    if value != round(value):
-        raise InvalidValueError("sensitivity", value, "must be a whole number from 0 to 5")
-    return round(value)
+def _level(value: float) -> int:
+    return as_whole("sensitivity", value, SENSITIVITIES[1])
