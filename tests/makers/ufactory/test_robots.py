@@ -87,14 +87,14 @@ def test_ranges_are_those_of_the_client_library(name):
 @pytest.mark.parametrize(
     ("name", "solver"),
     [
-        ("xArm5", "NumericSolver"),
+        ("xArm5", "PlanarFive"),
         ("xArm6", "OffsetSix"),
         ("xArm7", "OffsetSeven"),
         ("Lite6", "OffsetSix"),
         ("850", "OffsetSix"),
     ],
 )
-def test_arms_with_6_and_7_axes_have_a_closed_form(name, solver):
+def test_arms_have_a_closed_form(name, solver):
     assert type(build_solver(load_model(name).description)).__name__ == solver
 
 

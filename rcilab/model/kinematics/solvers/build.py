@@ -12,6 +12,7 @@ from rcilab.model.kinematics.solvers.offset6.solver import OffsetSix
 from rcilab.model.kinematics.solvers.offset7.arm import build_offset_geometry
 from rcilab.model.kinematics.solvers.offset7.solver import OffsetSeven
 from rcilab.model.kinematics.solvers.parallel6 import ParallelSix, build_parallel_six
+from rcilab.model.kinematics.solvers.planar5 import PlanarFive, build_planar_five
 from rcilab.model.kinematics.solvers.solver import KinematicsSolver
 from rcilab.model.kinematics.solvers.spherical.inverse import build_geometry
 from rcilab.model.kinematics.solvers.spherical6 import SphericalSix
@@ -41,6 +42,10 @@ def build_solver(description: RobotDescription) -> KinematicsSolver:
         pass
     try:
         return ParallelSix(description, build_parallel_six(description))
+    except ModelError:
+        pass
+    try:
+        return PlanarFive(description, build_planar_five(description))
     except ModelError:
         pass
     try:

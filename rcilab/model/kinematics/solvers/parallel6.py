@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rcilab.core.arrays import Array
 from rcilab.core.errors import ModelError
-from rcilab.model.kinematics.solvers.closed_six import ClosedSix
+from rcilab.model.kinematics.solvers.closed_form import ClosedForm
 from rcilab.model.kinematics.solvers.solver import Envelope
 from rcilab.robots.description import DhRow, RobotDescription
 
@@ -55,7 +55,7 @@ class ParallelSixGeometry:
     """Theta offsets of the table, [rad]."""
 
 
-class ParallelSix(ClosedSix):
+class ParallelSix(ClosedForm):
     """The solver of arms with the geometry of `build_parallel_six`."""
 
     def __init__(self, description: RobotDescription, geometry: ParallelSixGeometry) -> None:
@@ -96,7 +96,7 @@ def build_parallel_six(description: RobotDescription) -> ParallelSixGeometry:
 def solve_poses(
     arm: ParallelSixGeometry, rotations: Array, positions: Array, near: Sequence[float] | None = None
 ) -> tuple[NDArray[np.intp], Array]:
-    """Returns solutions at many poses, also outside the joint limits; see `closed_six.SolvePoses`."""
+    """Returns solutions at many poses, also outside the joint limits; see `closed_form.SolvePoses`."""
     first_near, last_near = (0.0, 0.0) if near is None else (near[0] + arm.offsets[0], near[5] + arm.offsets[5])
     side, fold, elbow = (_SIGNS[:, i] for i in range(3))
     s1, s4, s5 = arm.turns

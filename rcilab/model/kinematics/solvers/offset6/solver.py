@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from functools import partial
 
-from rcilab.model.kinematics.solvers.closed_six import ClosedSix
+from rcilab.model.kinematics.solvers.closed_form import ClosedForm
 from rcilab.model.kinematics.solvers.offset6.arm import OffsetSixGeometry
 from rcilab.model.kinematics.solvers.offset6.inverse import solve_poses
 from rcilab.model.kinematics.solvers.solver import Envelope
 from rcilab.robots.description import RobotDescription
 
 
-class OffsetSix(ClosedSix):
+class OffsetSix(ClosedForm):
     """The solver of arms with the geometry of `build_offset_six`."""
 
     def __init__(self, description: RobotDescription, geometry: OffsetSixGeometry) -> None:

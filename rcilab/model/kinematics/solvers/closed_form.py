@@ -1,4 +1,4 @@
-"""What solvers of 6 axes in closed form share: every solution from one function, for one pose or many."""
+"""What solvers in closed form without redundancy share: every solution from one function, for one pose or many."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class SolvePoses(Protocol):
     def __call__(
         self, rotations: Array, positions: Array, near: Sequence[float] | None = None
     ) -> tuple[NDArray[np.intp], Array]:
-        """Returns which pose each solution belongs to, shape (R,), and the solutions, shape (R, 6), [rad].
+        """Returns which pose each solution belongs to, shape (R,), and the solutions, shape (R, n), [rad].
 
         Args:
             rotations: Flange in base, shape (N, 3, 3).
@@ -33,7 +33,7 @@ class SolvePoses(Protocol):
         ...
 
 
-class ClosedSix(NumericSolver):
+class ClosedForm(NumericSolver):
     """The numeric solver with every solution in closed form instead of a search.
 
     Args:
@@ -49,20 +49,20 @@ class ClosedSix(NumericSolver):
 
     def at(self, T_base_flange: Pose, near: Sequence[float] | None) -> PoseSolver:
         """Returns the inverse at a pose, computed on demand."""
-        return _ClosedSixPose(self._arm, self._solve_poses, self.envelope, T_base_flange, near)
+        return _ClosedPose(self._arm, self._solve_poses, self.envelope, T_base_flange, near)
 
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
-        """Returns the solutions at N poses, shape (N, M, 6), M from the pose with the most."""
+        """Returns the solutions at N poses, shape (N, M, n), M from the pose with the most."""
         rows, q = self._solve_poses(T_base_flange[:, :3, :3], T_base_flange[:, :3, 3])
         found = [self._arm.distinct(q[rows == row]) for row in range(len(T_base_flange))]
-        table = np.full((len(found), max(1, *map(len, found)), 6), np.nan)
+        table = np.full((len(found), max(1, *map(len, found)), self._arm.n), np.nan)
         for row, branches in enumerate(found):
             if branches:
                 table[row, : len(branches)] = branches
         return table
 
 
-class _ClosedSixPose:
+class _ClosedPose:
     def __init__(
         self, arm: NumericArm, solve_poses: SolvePoses, envelope: Envelope, pose: Pose, near: Sequence[float] | None
     ) -> None:
