@@ -14,9 +14,8 @@ from rcilab.model.robot_model import RobotModel
 TOOL_VELOCITY_PART = 0.85
 """Part of the bound that planned motions and jogs use.
 
-Tuning value. A controller with this bound measures the tool on its own curve through targets that arrive irregularly.
-UFACTORY's virtual one moves the tool up to 9 % faster than the targets if they are late by up to 1 ms, 14 % if by up to
-2 ms, 20 % if by up to 3 ms.
+Tuning value: a controller with this bound measures the tool on its own curve through the targets, which needs room to
+make up for those that arrive late.
 """
 
 

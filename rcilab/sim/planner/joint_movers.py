@@ -10,21 +10,23 @@ import numpy as np
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import PlanningError
 from rcilab.core.limits import JointLimits
+from rcilab.model.robot_model import RobotModel
 from rcilab.motion import _ruckig
 from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.sim.planner.braking import stop_distance
 from rcilab.sim.planner.mover import MotionState
 from rcilab.sim.planner.section_bounds import joint_bounds
 from rcilab.sim.planner.stream_filter import StreamFilter, StreamMode
+from rcilab.sim.planner.stream_speed import StreamSpeed
 from rcilab.sim.planner.target import JointSpeed
 
 _STANDSTILL = (1e-9, 1e-6)  # [rad/s], [rad/s^2] Rounding of the curve.
 _THERE = 1e-7  # [rad] ruckig reaches a goal within 1e-8.
 _NEAR = 1e-6  # [rad] From the streamed angles: beyond it the joints catch up with them.
 _ROUNDING = 1e-12  # [rad], [rad/s].
+_END = 5e-4  # [rad] Inside its range, where a joint that moves stops at the latest: more than rounding.
 _LEAST_SPEED = 0.01  # Of the largest one, by which a joint at that speed still catches up; a tuning value.
 _CATCH_UP = 0.1  # Of their velocity, by which a joint catches up with smoothed angles that may stop; a tuning value.
-_STOP_ROOM = 2.0  # By which a stop with small jerk is longer than one with constant deceleration; a tuning value.
 _FASTEST = JointSpeed()
 _SLOW = 2e-4  # [rad/s] Relative to angles that move: a slower joint that is near follows them.
 _ROUNDED, _ROUNDED_JERK = 1.25, 3.0  # Shares of the largest acceleration and jerk; tuned for angles in 0.001 deg.
@@ -144,17 +146,19 @@ class StreamMover:
         target: The newest angles, [rad].
 
     Args:
+        model: The arm with its tool.
         limits: Of the joints.
         state: Where it begins.
     """
 
-    def __init__(self, limits: JointLimits, state: MotionState) -> None:
-        self._limits = limits
+    def __init__(self, model: RobotModel, limits: JointLimits, state: MotionState) -> None:
+        self._model, self._limits = model, limits
         bounds = joint_bounds(limits, _FASTEST)
         self._bounds: tuple[list[float], list[float]] = bounds.acceleration.tolist(), bounds.jerk.tolist()
         self._axes = _ruckig.Stepper(*state, *self._bounds)
         self._velocity: list[float] = bounds.velocity.tolist()
         self._filter = StreamFilter(state.q, "direct", 0.0)
+        self._tool: StreamSpeed | None = None
         self.target = list(state.q)
         self._line_velocity = [0.0] * len(state.q)
         self._is_off = False  # Whether it approaches the angles to follow.
@@ -176,7 +180,9 @@ class StreamMover:
             self._is_stationary = is_there and self._filter.is_settled and _stands(axes)
         return self._is_stationary
 
-    def take(self, q: list[float], speed: JointSpeed, mode: StreamMode, smoothing: float) -> None:
+    def take(
+        self, q: list[float], speed: JointSpeed, mode: StreamMode, smoothing: float, tool_speed: float | None = None
+    ) -> None:
         """Takes the newest angles, n finite numbers, [rad].
 
         Args:
@@ -184,6 +190,7 @@ class StreamMover:
             speed: Of the joints.
             mode: How they are followed.
             smoothing: From 0 to 1.
+            tool_speed: Of the tool in mode "linear" where targets came late, [m/s]; None: any.
         """
         if (mode, smoothing) != (self._filter.mode, self._filter.smoothing):
             self._filter = StreamFilter(self._axes.q, mode, smoothing)
@@ -194,18 +201,30 @@ class StreamMover:
             ]
         self._velocity = joint_bounds(self._limits, speed).velocity.tolist()
         self.target = q
-        self._filter.take(q)
+        if tool_speed is None:
+            self._tool = None
+        elif self._tool is None or self._tool.largest != tool_speed:
+            self._tool = StreamSpeed(self._model, tool_speed)
+        self._filter.take(q, 0.0 if self._tool is None else self._tool.take(self._filter.output, q))
         self._is_stationary = None
 
     def step(self) -> list[float]:
         """Advances one cycle and returns the joint angles, n plain floats, [rad]."""
+        if self._tool is not None:
+            self._tool.step()
         if self._filter.mode in ("direct", "linear") and self.is_stationary:
             return list(self._axes.q)
         self._is_stationary = None
         q = self._filter.step()
         if self._filter.mode == "linear":
-            if not self._stays_on_line(q, self._filter.velocity):
-                self._step_along(q, self._velocities_through(q), self._velocity)
+            before = self.state
+            dq = self._filter.velocity
+            if not self._stays_on_line(q, dq):
+                self._step_along(
+                    q, [min(max(v, -top), top) for v, top in zip(dq, self._velocity, strict=True)], self._velocity
+                )
+                self._keep_slow(before)
+            self._keep_inside(before, q)
         elif self._filter.mode == "direct":
             self._axes.step_to_positions(q, self._velocity)
         else:
@@ -254,11 +273,10 @@ class StreamMover:
         """
         axes, limits = self._axes, self._limits
         after = self.state
+        ends = zip((limits.lower + _END).tolist(), (limits.upper - _END).tolist(), strict=True)
         stops = [
             low <= x - stop_distance(-v, -a, a_max, j_max) and x + stop_distance(v, a, a_max, j_max) <= high
-            for x, v, a, a_max, j_max, low, high in zip(
-                *after, *self._bounds, limits.lower.tolist(), limits.upper.tolist(), strict=True
-            )
+            for x, v, a, a_max, j_max, (low, high) in zip(*after, *self._bounds, ends, strict=True)
         ]
         if all(stops):
             return
@@ -270,6 +288,19 @@ class StreamMover:
         ]
         axes.set_state(*mixed)
         self._is_off = True
+
+    def _keep_slow(self, before: MotionState) -> None:
+        """Shortens the step of this cycle to one that the tool may move; the joints accelerate less then.
+
+        Args:
+            before: The state at the start of this cycle.
+        """
+        axes = self._axes
+        share = 1.0 if self._tool is None else self._tool.share(before.q, axes.q)
+        if share < 1.0:
+            dq = [share * v for v in axes.dq]
+            ddq = [(v - v1) / CYCLE_TIME for v, v1 in zip(dq, before.dq, strict=True)]
+            axes.set_state([x + share * (x1 - x) for x, x1 in zip(before.q, axes.q, strict=True)], dq, ddq)
 
     def _step_along(self, q: Sequence[float], dq: Sequence[float], velocity: Sequence[float]) -> None:
         """Advances to angles that themselves move, and catches up with them.
@@ -292,17 +323,6 @@ class StreamMover:
         axes.step_to_positions([0.0] * len(q), bounds)
         angles = [goal + x for goal, x in zip(q, axes.q, strict=True)]
         axes.set_state(angles, [v + x for v, x in zip(dq, axes.dq, strict=True)], axes.ddq)
-
-    def _velocities_through(self, q: Sequence[float]) -> list[float]:
-        """Returns the velocities of the streamed angles, zero where a joint could not stop inside its range."""
-        limits = self._limits
-        found: list[float] = []
-        for x, v, v_max, a_max, low, high in zip(
-            q, self._filter.velocity, self._velocity, self._bounds[0], limits.lower, limits.upper, strict=True
-        ):
-            stop = x + _STOP_ROOM * v * abs(v) / (2.0 * a_max)
-            found.append(min(max(v, -v_max), v_max) if low < stop < high else 0.0)
-        return found
 
     def _takes(self, q: Sequence[float]) -> bool:
         """Advances to these angles if that is inside the bounds by differences; returns whether it is.

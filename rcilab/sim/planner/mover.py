@@ -30,9 +30,5 @@ class Mover(Protocol):
         ...
 
     def step(self) -> list[float]:
-        """Advances one cycle and returns the joint angles, n plain floats, [rad].
-
-        Raises:
-            KinematicsError: A pose along the path is out of reach or singular; the arm has not moved.
-        """
+        """Advances one cycle and returns the joint angles, n plain floats, [rad]."""
         ...

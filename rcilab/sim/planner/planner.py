@@ -73,6 +73,7 @@ class Planner:
         self._pending: list[PlannerEvent] = []
         self._queue = PathMotion(self._arm, q)
         self._mover: Mover | None = None
+        self._obstruction: Refusal | None = None  # Of an on-line line that has ended before its goal.
         self._q = list(q)
         self._past = (self._q,) * 3  # The last angles, the newest first.
 
@@ -85,7 +86,7 @@ class Planner:
         self._pending += self._queue.discard()
         self._queue = PathMotion(self._arm, q)
         self._queue.set_override(self._override)
-        self._mover = None
+        self._mover = self._obstruction = None
         self._q = list(q)
         self._past = (self._q,) * 3
 
@@ -120,9 +121,9 @@ class Planner:
         return PlannerState.IDLE if self._queue.is_idle else PlannerState.MOVING
 
     @property
-    def is_blocked(self) -> bool:
-        """Whether a twist has ended, or almost, where no joint velocities give it, as at the end of reach."""
-        return isinstance(self._mover, VelocityMover) and self._mover.is_blocked
+    def obstruction(self) -> Refusal | None:
+        """Why an on-line motion of the tool has stopped, or almost, before its goal or the end of its twist."""
+        return self._mover.obstruction if isinstance(self._mover, VelocityMover) else self._obstruction
 
     @property
     def q(self) -> list[float]:
@@ -315,7 +316,12 @@ class Planner:
         return self._move_by_velocity(lambda mover: mover.set_twist(desired, speed, frame, duration))
 
     def servo_joints(
-        self, q: Sequence[float], *, mode: StreamMode = "direct", velocity: float | None = None
+        self,
+        q: Sequence[float],
+        *,
+        mode: StreamMode = "direct",
+        velocity: float | None = None,
+        tool_speed: float | None = None,
     ) -> Refusal | None:
         """Moves every joint by itself to the newest angles, with the largest acceleration and jerk.
 
@@ -323,6 +329,8 @@ class Planner:
             q: n finite numbers, [rad].
             mode: "direct", or "linear" for a stream that is followed one period later.
             velocity: Of every joint, above zero, [rad/s]; None: the limits.
+            tool_speed: Which the tool does not pass to make up for targets of a "linear" stream that come late or
+                together, above zero, [m/s]; None: any.
 
         Returns:
             Why the command is refused, without effect; None: it is followed.
@@ -330,7 +338,7 @@ class Planner:
         Raises:
             InvalidValueError: q is not n finite numbers, or the velocity is not valid.
         """
-        return self.follow_joints(q, mode=mode, velocity=velocity)
+        return self.follow_joints(q, mode=mode, velocity=velocity, tool_speed=tool_speed)
 
     def servo_tool(
         self,
@@ -338,6 +346,7 @@ class Planner:
         *,
         mode: StreamMode = "direct",
         velocity: float | None = None,
+        tool_speed: float | None = None,
         max_step: float | None = None,
     ) -> Refusal | None:
         """Moves every joint by itself to the angles of the newest pose, as `servo_joints`.
@@ -346,6 +355,7 @@ class Planner:
             pose: Pose of the tool in base.
             mode: As for `servo_joints`.
             velocity: Of every joint, above zero, [rad/s]; None: the limits.
+            tool_speed: As for `servo_joints`.
             max_step: Largest distance from the last pose, [m]; None: any.
 
         Returns:
@@ -354,7 +364,7 @@ class Planner:
         Raises:
             InvalidValueError: The velocity is not valid.
         """
-        return self.follow_tool(pose, mode=mode, velocity=velocity, max_step=max_step)
+        return self.follow_tool(pose, mode=mode, velocity=velocity, tool_speed=tool_speed, max_step=max_step)
 
     def follow_joints(
         self,
@@ -363,6 +373,7 @@ class Planner:
         mode: StreamMode = "direct",
         smoothing: float = 0.0,
         velocity: float | None = None,
+        tool_speed: float | None = None,
     ) -> Refusal | None:
         """Follows streamed joint angles, smoothed, as `servo_joints`.
 
@@ -371,6 +382,7 @@ class Planner:
             mode: As they come, on a curve through them, or low-pass filtered.
             smoothing: Of the curve or the filter, 0 to 1.
             velocity: Of every joint, above zero, [rad/s]; None: the limits.
+            tool_speed: As for `servo_joints`.
 
         Returns:
             Why the command is refused, without effect; None: it is followed.
@@ -388,9 +400,9 @@ class Planner:
             return refusal
         mover = self._mover
         if not isinstance(mover, StreamMover):
-            mover = StreamMover(self._arm.limits.joint, self._running_state())
+            mover = StreamMover(self._arm.model, self._arm.limits.joint, self._running_state())
             self._take_over(mover)
-        mover.take(goal, speed, mode, smoothing)
+        mover.take(goal, speed, mode, smoothing, tool_speed)
         return None
 
     def follow_tool(
@@ -400,6 +412,7 @@ class Planner:
         mode: StreamMode = "direct",
         smoothing: float = 0.0,
         velocity: float | None = None,
+        tool_speed: float | None = None,
         max_step: float | None = None,
     ) -> Refusal | None:
         """Follows streamed poses of the tool by the nearest joint angles, smoothed, as `follow_joints`.
@@ -409,6 +422,7 @@ class Planner:
             mode: As for `follow_joints`.
             smoothing: As for `follow_joints`.
             velocity: Of every joint, above zero, [rad/s]; None: the limits.
+            tool_speed: As for `servo_joints`.
             max_step: Largest distance from the last pose, [m]; None: any.
 
         Returns:
@@ -434,7 +448,7 @@ class Planner:
             goal = self._arm.solver.next_to(pose, near)
         except KinematicsError as error:
             return refusal_of(error, 1.0)
-        return self.follow_joints(goal, mode=mode, smoothing=smoothing, velocity=velocity)
+        return self.follow_joints(goal, mode=mode, smoothing=smoothing, velocity=velocity, tool_speed=tool_speed)
 
     def take_events(self) -> tuple[PlannerEvent, ...]:
         """Returns the events since the last step, for a cycle without one."""
@@ -447,6 +461,10 @@ class Planner:
         try:
             if self._mover is not None:
                 self._q = self._mover.step()
+                if isinstance(self._mover, ToolMover) and self._mover.obstruction is not None:
+                    obstruction = self._mover.obstruction
+                    self.stop()
+                    self._obstruction = obstruction
                 if self._queue.queued and self._mover.is_stationary:
                     self._mover = None
                     self._queue.begin_at(self._q)
@@ -471,7 +489,7 @@ class Planner:
 
     def _take_over(self, mover: Mover) -> None:
         """Moves by another mover from the next step on; all targets are discarded."""
-        self._mover = mover
+        self._mover, self._obstruction = mover, None
         self._pending += self._queue.discard()
 
     def _move_by_velocity(self, command: Callable[[VelocityMover], None]) -> Refusal | None:

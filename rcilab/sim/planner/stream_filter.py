@@ -67,8 +67,18 @@ class StreamFilter:
         """Velocities of the output of "linear", n plain floats, [rad/s]."""
         return list(self._velocity)
 
-    def take(self, q: Sequence[float]) -> None:
-        """Takes the newest angles, n numbers, [rad]."""
+    @property
+    def output(self) -> list[float]:
+        """Where the straight line to the newest angles is, n plain floats, [rad]."""
+        return self._output
+
+    def take(self, q: Sequence[float], shortest: float = 0.0) -> None:
+        """Takes the newest angles, n numbers, [rad].
+
+        Args:
+            q: The angles.
+            shortest: Least duration of the straight line to them, [cycles].
+        """
         self._period = min(max(1, self._since), _LONGEST_PERIOD)
         left = self._steps * max(0.0, 1.0 - self._since / self._duration)
         late = self._since / self._mean_period if self._periods else 1.0  # In periods.
@@ -81,7 +91,7 @@ class StreamFilter:
         # A target that comes early does not make the joints faster: they still have a part of the last step to go. Nor
         # does a late one.
         self._steps = max(min(1.0 + left, _MOST_STEPS), late if late > _LATE else 1.0)
-        self._duration = self._mean_period * (1.0 + _KEPT * (self._steps - 1.0))
+        self._duration = max(shortest, self._mean_period * (1.0 + _KEPT * (self._steps - 1.0)))
         self._since = 0
         self._start = self._output
         self._before, self._target = self._target, list(q)

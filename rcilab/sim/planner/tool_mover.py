@@ -13,6 +13,7 @@ from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose, rotation_between, rotation_from_wxyz
 from rcilab.motion import _ruckig
 from rcilab.motion.hermite import central_state
+from rcilab.sim.planner.braking import stop_distance
 from rcilab.sim.planner.mover import MotionState
 from rcilab.sim.planner.planner_event import Refusal
 from rcilab.sim.planner.preparation import PlannedArm, find_outside, refusal_of
@@ -33,14 +34,21 @@ class ToolMover:
     Position and rotation vector, relative to the goal, go to zero together. From standstill, or from a motion along
     this line, the tool moves on the straight line and turns about one axis.
 
+    Attributes:
+        obstruction: Why the arm cannot go on to the goal; None: it can. It is to be stopped.
+
     Args:
         arm: The arm.
         state: Where it begins.
     """
 
     def __init__(self, arm: PlannedArm, state: MotionState) -> None:
+        self.obstruction: Refusal | None = None
         self._arm = arm
-        self._q = list(state.q)
+        self._q, self._dq = list(state.q), list(state.dq)
+        limits = arm.limits.joint
+        self._ends = list(zip(limits.lower.tolist(), limits.upper.tolist(), strict=True))
+        self._rates = list(zip(limits.acceleration.tolist(), limits.jerk.tolist(), strict=True))
         q, dq, ddq = (np.array(part) for part in state)
         self._poses: Callable[[float], Pose] = lambda t: arm.model.forward(q + t * dq + 0.5 * t * t * ddq)
         self._plan: _PosePlan | None = None
@@ -84,21 +92,37 @@ class ToolMover:
         return None
 
     def step(self) -> list[float]:
-        """Advances one cycle and returns the joint angles, n plain floats, [rad].
-
-        Raises:
-            KinematicsError: The next pose is out of reach or singular; the arm has not moved.
-        """
-        if self._plan is not None and not self.is_stationary:
-            t = self._t + CYCLE_TIME
-            self._q = self._arm.solver.next_to(self._plan.at(t), self._q)
+        """Advances one cycle and returns the joint angles, n plain floats, [rad]."""
+        plan = self._plan
+        if plan is not None and not self.is_stationary:
+            t, before = self._t + CYCLE_TIME, self._q
+            share = t / plan.duration
+            try:
+                self._q = self._arm.solver.next_to(plan.at(t), before)
+            except KinematicsError as error:  # Between two samples that were reachable.
+                self.obstruction = refusal_of(error, share)
+                return list(before)
             self._t = t
+            self.obstruction = self._find_leaving(before, share)
         return list(self._q)
+
+    def _find_leaving(self, before: Sequence[float], share: float) -> Refusal | None:
+        """Finds a joint that can only just stop inside its range.
+
+        Args:
+            before: The angles of the last cycle, [rad].
+            share: Part of the path.
+        """
+        dq = [(x - x1) / CYCLE_TIME for x, x1 in zip(self._q, before, strict=True)]
+        ends: list[float] = []
+        for x, v, v1, bounds in zip(self._q, dq, self._dq, self._rates, strict=True):
+            a = (v - v1) / CYCLE_TIME
+            ends.append(x + stop_distance(v, a, *bounds) - stop_distance(-v, -a, *bounds))
+        self._dq = dq
+        return find_outside(ends, self._ends, share)
 
     def _sample(self, plan: _PosePlan) -> Refusal | list[list[float]]:
         """Returns why a plan cannot be followed, or joint angles at even times after the start."""
-        limits = self._arm.limits.joint
-        ends = list(zip(limits.lower.tolist(), limits.upper.tolist(), strict=True))
         count = min(max(_FEWEST, round(max(plan.length / _SAMPLE_LENGTH, plan.turn / _SAMPLE_ANGLE))), _MOST)
         rows: list[list[float]] = []
         q = self._q
@@ -108,7 +132,7 @@ class ToolMover:
                 q = self._arm.solver.next_to(plan.at(share * plan.duration), q)
             except KinematicsError as error:
                 return refusal_of(error, share if self._reaches(plan.at(plan.duration)) else 1.0)
-            refusal = find_outside(q, ends, share)
+            refusal = find_outside(q, self._ends, share)
             if refusal is not None:
                 return refusal
             rows.append(q)

@@ -11,16 +11,20 @@ from rcilab.core.arrays import Array, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import PlanningError
 from rcilab.core.limits import Limits
+from rcilab.i18n.translator import Remark
 from rcilab.model.robot_model import RobotModel
+from rcilab.motion.bounds import angle_text
 from rcilab.motion.online import Jog
 from rcilab.motion.twist import RAMP_PART, Frame
 from rcilab.sim.planner.joint_movers import StopMover
 from rcilab.sim.planner.mover import MotionState
+from rcilab.sim.planner.planner_event import Refusal, RefusalReason
 from rcilab.sim.planner.section_bounds import joint_bounds
 from rcilab.sim.planner.target import JointSpeed, ToolSpeed
 
 _ABOVE = 1.001  # Part of the present acceleration that the bound is at least: it must be inside.
 _BLOCKED_BELOW = 0.01  # Part of its twist at which the tool counts as stopped; a tuning value.
+_AT_END = 2e-3  # [rad] From the end of its range, where a joint has stopped, or almost; a tuning value.
 _SLOWEST = 0.01  # Part of its acceleration and jerk that a joint may use at least, also where its change is small.
 
 
@@ -44,6 +48,7 @@ class VelocityMover:
         self._command: Callable[[Jog], None] = Jog.stop
         self._end: Callable[[Jog], None] = Jog.stop  # After the time of the command.
         self._is_stopping = True
+        self._is_twist = False
         self._cycles: int | None = None  # Until it stops.
         if self._stop.is_stationary:
             self._jog, self._stop = Jog(model, state.q, limits=limits), None
@@ -63,10 +68,12 @@ class VelocityMover:
         return self._is_stopping and self._jog is not None and self._jog.is_stationary
 
     @property
-    def is_blocked(self) -> bool:
-        """Whether the tool has stopped, or almost, where no joint velocities give its twist, as at the end of reach."""
+    def obstruction(self) -> Refusal | None:
+        """Why the tool has stopped, or almost, before the end of its twist; None: it has not, or joints move."""
         jog = self._jog
-        return not self._is_stopping and jog is not None and jog.is_damped and jog.part < _BLOCKED_BELOW
+        if self._is_stopping or not self._is_twist or jog is None or jog.part >= _BLOCKED_BELOW:
+            return None
+        return _BLOCKED if jog.is_damped else self._find_end(jog)
 
     def set_joint_velocity(
         self, dq: Sequence[float], speed: JointSpeed, *, is_synchronized: bool, duration: float | None
@@ -90,6 +97,7 @@ class VelocityMover:
         present = np.minimum(_ABOVE * np.abs(np.array(state.ddq)), joint.acceleration)
         acceleration = np.maximum(parts * bounds.acceleration, present)
         limits = replace(joint, acceleration=readonly_copy(acceleration), jerk=readonly_copy(parts * bounds.jerk))
+        self._is_twist = False
         self._begin(replace(self._limits, joint=limits), lambda jog: jog.set_joint_velocity(wanted), any(dq), duration)
         still = [0.0] * len(wanted)
         self._end = lambda jog: self.set_joint_velocity(still, speed, is_synchronized=is_synchronized, duration=None)
@@ -120,6 +128,7 @@ class VelocityMover:
         inside = {name: min(x, getattr(cartesian, name)) for name, x in wanted.items() if x is not None}
         limits = replace(self._limits, cartesian=replace(cartesian, **inside))
         self._end = lambda jog: jog.set_twist(np.zeros(6), frame=frame)
+        self._is_twist = True
         self._begin(limits, lambda jog: jog.set_twist(twist, frame=frame), any(twist), duration)
 
     def end(self) -> None:
@@ -145,6 +154,21 @@ class VelocityMover:
                 return self.step()
         return self._jog.step().tolist()
 
+    def _find_end(self, jog: Jog) -> Refusal | None:
+        """Finds a joint that stands at the end of its range, or almost, on the side to which it moves."""
+        joint = self._limits.joint
+        for number, (q, dq, lower, upper) in enumerate(
+            zip(jog.q.tolist(), jog.dq.tolist(), joint.lower.tolist(), joint.upper.tolist(), strict=True), 1
+        ):
+            bound = lower if q - lower < _AT_END and dq <= 0.0 else upper if upper - q < _AT_END and dq >= 0.0 else None
+            if bound is not None:
+                text = f"joint {number} is at the end of its range, {angle_text(bound)}: the tool cannot move on"
+                remark = Remark(text, "range_end", joint=number, value=q, bound=bound, unit="rad")
+                return Refusal(
+                    reason=RefusalReason.JOINT_RANGE, remark=remark, share=1.0, joint=number, value=q, bound=bound
+                )
+        return None
+
     def _begin(self, limits: Limits, command: Callable[[Jog], None], is_moving: bool, duration: float | None) -> None:
         self._is_stopping = not is_moving
         self._cycles = None if duration is None else round(duration / CYCLE_TIME)
@@ -164,6 +188,16 @@ class VelocityMover:
             self._jog = Jog(self._model, *self.state, limits=limits)
             self._used = limits
         return self._jog
+
+
+_BLOCKED = Refusal(
+    reason=RefusalReason.UNREACHABLE,
+    remark=Remark(
+        "the tool cannot move on with this velocity: it is at the end of its reach, or at a singular pose",
+        "twist_blocked",
+    ),
+    share=1.0,
+)
 
 
 def _are_equal(a: Limits, b: Limits) -> bool:

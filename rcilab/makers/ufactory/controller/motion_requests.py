@@ -212,13 +212,16 @@ def _servo(
 ) -> Outcome:
     if not controller.take_servo():
         return Outcome(answer, is_dropped=True)
+    speed = controller.settings.servo_tool_speed(controller.model.limits)
     if function is Function.SERVO_JOINT:
         q = _joints(controller, values)
-        controller.follow(task, partial(Planner.servo_joints, q=q, mode="linear"))
+        controller.follow(task, partial(Planner.servo_joints, q=q, mode="linear", tool_speed=speed))
         controller.end.begin(q)
     else:
         pose = _servo_pose(controller, function, values)
-        controller.follow(task, partial(Planner.servo_tool, pose=pose, mode="linear", max_step=SERVO_STEP))
+        controller.follow(
+            task, partial(Planner.servo_tool, pose=pose, mode="linear", tool_speed=speed, max_step=SERVO_STEP)
+        )
         controller.end.move(pose)
     return Outcome(answer)
 

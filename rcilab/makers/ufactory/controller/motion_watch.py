@@ -9,7 +9,7 @@ import numpy as np
 
 from rcilab.conformance.common_conditions import VELOCITY_ALLOWANCE
 from rcilab.i18n.translator import Remark
-from rcilab.makers.ufactory.bounds import JOINT_VELOCITY, SERVO_SPEED_FACTOR
+from rcilab.makers.ufactory.bounds import JOINT_VELOCITY
 from rcilab.makers.ufactory.controller.settings import MILLIMETRE, Settings
 from rcilab.makers.ufactory.errors import UfactoryError
 from rcilab.sim.self_collision import SelfCollisionWatch
@@ -51,18 +51,16 @@ class MotionWatch:
         self._last_excess = self._excess(settings)
         self._overload = 0
 
-    def step(self, settings: Settings, *, is_servo: bool, is_blocked: bool) -> Finding | None:
+    def step(self, settings: Settings, *, is_servo: bool) -> Finding | None:
         """Returns what is wrong in this cycle of a motion, or None.
 
         Args:
             settings: Those of the controller.
             is_servo: Whether its mode is that of servo targets.
-            is_blocked: Whether a velocity of the tool cannot be followed any farther.
         """
         return (
             self._find_outside(settings)
             or (self._find_fast(settings) if is_servo else None)
-            or (_BLOCKED if is_blocked else None)
             or (self._find_touching() if settings.self_collision else None)
             or self._find_overload()
         )
@@ -89,7 +87,7 @@ class MotionWatch:
 
     def _find_fast(self, settings: Settings) -> Finding | None:
         speed = hypot(*self._arm.tool_c.twist[:3])
-        bound = self._arm.model.limits.joint_tool_velocity * settings.servo_speed_factor / SERVO_SPEED_FACTOR
+        bound = settings.servo_tool_speed(self._arm.model.limits)
         if speed <= bound * _SPEED_MARGIN:
             return None
         text = f"the tool would move with {speed:.3g} m/s, faster than {bound:g} m/s"
@@ -143,12 +141,3 @@ class GuidingWatch:
             return None
         text = f"joint {joint}: its speed of {speed:.3g} rad/s in mode 2 is above {bound:.3g} rad/s"
         return Finding(error, Remark(text, "guided_speed", joint=joint, value=speed, bound=bound, unit="rad/s"))
-
-
-_BLOCKED = Finding(
-    UfactoryError.KINEMATICS,
-    Remark(
-        "the tool cannot move on with this velocity: it is at the end of its reach, or at a singular pose",
-        "twist_blocked",
-    ),
-)

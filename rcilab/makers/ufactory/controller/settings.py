@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rcilab.core.errors import InvalidValueError
+from rcilab.core.limits import Limits
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.makers.ufactory.bounds import (
     DEFAULT_JOINT_JERK,
@@ -124,6 +125,14 @@ class Settings(ArmParameters):
     def tool_speed(self) -> float:
         """Largest velocity of the tool, [m/s]."""
         return self.reduced_tool_speed if self.reduced else TOOL_SPEED
+
+    def servo_tool_speed(self, limits: Limits) -> float:
+        """Returns the largest velocity of the tool in mode 1, [m/s].
+
+        Args:
+            limits: Those of the arm.
+        """
+        return limits.joint_tool_velocity * self.servo_speed_factor / SERVO_SPEED_FACTOR
 
     def is_inside(self, position: tuple[float, float, float]) -> bool:
         """Returns whether a position of the tool in base, [m], is inside the boundary, if it acts."""

@@ -503,12 +503,14 @@ class XArmController:
         if not self._was_following:
             self._was_following = True
             self._motion_watch.begin(self.settings)
+        obstruction = self.planner.obstruction
+        if obstruction is not None:
+            self.refuse(obstruction)
+            return
         if self.planner.state is not PlannerState.MOVING:
             self._end_online(EventKind.REACHED)
             return
-        found = self._motion_watch.step(
-            self.settings, is_servo=self.mode is Mode.SERVO, is_blocked=self.planner.is_blocked
-        )
+        found = self._motion_watch.step(self.settings, is_servo=self.mode is Mode.SERVO)
         if found is not None:
             self.fail(*found)
 

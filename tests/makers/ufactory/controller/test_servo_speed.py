@@ -37,3 +37,29 @@ def test_the_fastest_plan_is_followed_with_targets_that_are_late_by_up_to_2_ms(a
     assert arm.controller.error is None
     assert fastest > 0.84 * model.limits.joint_tool_velocity
     np.testing.assert_allclose(arm.q, motion.q[-1], atol=1e-6)
+
+
+@pytest.mark.parametrize("stall", [7, 20, 60])
+@pytest.mark.parametrize("lost", ["none", "old", "all but two"])
+def test_a_client_that_stalls_is_not_an_error(arm: Arm, stall: int, lost: str) -> None:
+    """Its targets move the tool with 0.96 of the bound; after a stall they come later, or the old ones are lost."""
+    model = arm.controller.model
+    bound = model.limits.joint_tool_velocity
+    rate = 0.96e-3 * bound / float(np.hypot(*model.forward(FAR).position[:2]))  # [rad] In a cycle.
+    arm.controller.set_up(ArmSetup(q=tuple(FAR)))
+    arm.ready(Mode.SERVO)
+    late, sent, fastest = 0, 0, 0.0
+    for cycle in range(600):
+        is_stalled = 300 <= cycle < 300 + stall
+        if cycle == 300 + stall and lost == "none":
+            late = stall
+        if cycle % 4 == 0 and not is_stalled:
+            rows = range(sent + 4, cycle - late + 1, 4) if lost == "all but two" else (cycle - late,)
+            for row in rows:
+                angle = FAR[0] + rate * (row - min(row, 200) * (1.0 - min(row, 200) / 400))
+                arm.call(Function.SERVO_JOINT, "10f", angle, *FAR[1:], *NOTHING)
+            sent = cycle - late
+        arm.step()
+        assert arm.controller.error is None
+        fastest = max(fastest, float(np.linalg.norm(arm.controller.arm.tool_c.twist[:3])))
+    assert fastest < 1.001 * bound
