@@ -157,6 +157,12 @@ class StreamMover:
         self._bounds: tuple[list[float], list[float]] = bounds.acceleration.tolist(), bounds.jerk.tolist()
         self._axes = _ruckig.Stepper(*state, *self._bounds)
         self._velocity: list[float] = bounds.velocity.tolist()
+        self._ends = [
+            (low + _END, high - _END, stop_distance(v, a, a, j))  # The longest stop.
+            for low, high, v, a, j in zip(
+                limits.lower.tolist(), limits.upper.tolist(), self._velocity, *self._bounds, strict=True
+            )
+        ]
         self._filter = StreamFilter(state.q, "direct", 0.0)
         self._tool: StreamSpeed | None = None
         self.target = list(state.q)
@@ -271,12 +277,13 @@ class StreamMover:
             before: The state at the start of this cycle.
             q: The angles to follow.
         """
-        axes, limits = self._axes, self._limits
+        axes = self._axes
+        if all(low + room < x < high - room for x, (low, high, room) in zip(axes.q, self._ends, strict=True)):
+            return
         after = self.state
-        ends = zip((limits.lower + _END).tolist(), (limits.upper - _END).tolist(), strict=True)
         stops = [
             low <= x - stop_distance(-v, -a, a_max, j_max) and x + stop_distance(v, a, a_max, j_max) <= high
-            for x, v, a, a_max, j_max, (low, high) in zip(*after, *self._bounds, ends, strict=True)
+            for x, v, a, a_max, j_max, (low, high, _) in zip(*after, *self._bounds, self._ends, strict=True)
         ]
         if all(stops):
             return
