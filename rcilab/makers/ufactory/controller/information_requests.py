@@ -43,6 +43,24 @@ def _joint(controller: XArmController, error: UfactoryError) -> int:
     return next((joint for remark in _reasons(controller, error) if (joint := round(_number(remark, "joint")))), 0)
 
 
+def _collision(controller: XArmController) -> bytes:
+    """Returns the joint of the last collision, the torque of its drive without it and the measured one, [N m]."""
+    error = UfactoryError.COLLISION
+    joint = _joint(controller, error)
+    if not joint:
+        return bytes(9)
+    external = next(_number(remark, "value") for remark in _reasons(controller, error) if "joint" in remark.facts)
+    actual = float(controller.measurements[error].tau[joint - 1])
+    return bytes([joint]) + encode_values("f", actual + external, actual)
+
+
+def _guided(controller: XArmController) -> bytes:
+    """Returns the joint that moved by itself in mode 2 and its angle, [rad]."""
+    error = UfactoryError.MANUAL_MODE
+    joint = _joint(controller, error)
+    return bytes([joint]) + encode_values("f", controller.measurements[error].q[joint - 1] if joint else 0.0)
+
+
 def _joint_speed(controller: XArmController) -> bytes:
     """Returns the joint that was too fast and its speed, [rad/s]; zeros where the tool was."""
     for remark in _reasons(controller, UfactoryError.SPEED):
@@ -77,8 +95,8 @@ def _number(remark: Remark, name: str) -> float:
 _INFORMATION: dict[int, Callable[[XArmController], bytes]] = {
     1: lambda c: bytes(1),  # Whether another geometry is used.
     2: lambda c: bytes(1),  # Whether an identification is in progress.
-    101: lambda c: bytes([_joint(c, UfactoryError.COLLISION)]) + bytes(8),
-    102: lambda c: bytes([_joint(c, UfactoryError.MANUAL_MODE)]) + bytes(4),
+    101: _collision,
+    102: _guided,
     103: _joint_range,
     104: _joint_speed,
     105: _servo_speed,

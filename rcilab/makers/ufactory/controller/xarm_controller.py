@@ -59,6 +59,7 @@ from rcilab.sim.planner import (
     RefusalReason,
     Target,
 )
+from rcilab.sim.plant import Measurement
 from rcilab.sim.violations import ArmCondition, Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 
@@ -111,6 +112,7 @@ class XArmController:
         enabled: Joints with motors on, a bit each.
         reason: Reason for the last error, as a sentence with numbers.
         reasons: The same of each error, when it last came.
+        measurements: What was measured then.
         counter: Of the client (`set_counter_increase`).
         state: Not to be confused with `robot_state`: the state in reports.
         ignored: Servo commands that came faster than 250 Hz.
@@ -137,6 +139,7 @@ class XArmController:
         self.enabled = 0
         self.reason = Remark("")
         self.reasons: dict[UfactoryError, Remark] = {}
+        self.measurements: dict[UfactoryError, Measurement] = {}
         self.counter = 0
         self.ignored = 0
         self.button: SafetyButton = "none"
@@ -436,7 +439,7 @@ class XArmController:
     def fail(self, error: UfactoryError, reason: Remark) -> None:
         """Sets an error and stops the arm."""
         self.error, self.reason = error, reason
-        self.reasons[error] = reason
+        self.reasons[error], self.measurements[error] = reason, self.arm.measured_state.measured
         if error in _BUTTONS.values() or UfactoryError.JOINT_1 <= error <= UfactoryError.JOINT_7:
             self.enabled = 0
         self._end_motions()

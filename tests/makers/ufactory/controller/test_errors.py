@@ -191,6 +191,10 @@ def test_a_collision_is_an_error() -> None:
     arm.run(until=lambda: arm.controller.error is not None)
     assert arm.controller.error == 31
     assert "external torque" in str(arm.controller.reason)
+    joint, expected, actual = struct.unpack("<B2f", arm.call(Function.GET_COMMON_INFORMATION, "B", 101)[1])
+    assert joint == 1
+    assert abs(expected) < 5.0  # [N m] It turns about the vertical.
+    assert abs(actual - expected) > 30.0
 
 
 def test_a_drive_at_its_largest_torque_is_the_error_of_its_joint_and_switches_motors_off() -> None:
@@ -229,6 +233,9 @@ def test_an_arm_with_another_load_moves_by_itself_in_mode_2(undetected: int, err
     arm.call(Function.SET_STATE, "B", 0)
     arm.step(400)
     assert arm.controller.error == error
+    joint, angle = struct.unpack("<Bf", arm.call(Function.GET_COMMON_INFORMATION, "B", 102)[1])
+    assert (joint > 0) is (error is not None)
+    assert angle == pytest.approx(Q6[joint - 1] if joint else 0.0, abs=0.1)
 
 
 @pytest.mark.parametrize(
