@@ -230,6 +230,8 @@ class StreamMover:
                     q, [min(max(v, -top), top) for v, top in zip(dq, self._velocity, strict=True)], self._velocity
                 )
                 self._keep_slow(before)
+            elif self._tool is not None:
+                self._tool.reach()
             self._keep_inside(before, q)
         elif self._filter.mode == "direct":
             self._axes.step_to_positions(q, self._velocity)

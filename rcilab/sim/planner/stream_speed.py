@@ -11,6 +11,7 @@ from rcilab.model.robot_model import RobotModel
 
 _INTERVALS = 8  # Of which one is as long as the client meant it: after a stall some are shorter; a tuning value.
 _LONGEST_PERIOD = 100  # [cycles] Angles that come later begin another stream.
+_FIRST_PERIOD = 4  # [cycles] Assumed before the first angles of a stream.
 _INSIDE = 0.99  # Of the bound: the tool's path between two targets is not exactly straight.
 
 
@@ -18,7 +19,8 @@ class StreamSpeed:
     """Bounds the speed of a tool whose targets themselves are not too fast. Owned by a `StreamMover`.
 
     Targets that come late, or together, are far apart for the time between them. They are as fast as over the slowest
-    of the last intervals, from each of the last targets to the newest.
+    of the last intervals, from each of the last targets to the newest. After one that is too fast, as a jump, there is
+    no bound until the joints have caught up.
 
     Args:
         model: The arm with its tool.
@@ -30,11 +32,15 @@ class StreamSpeed:
         self._model = model
         self._points: deque[tuple[int, Sequence[float]]] = deque(maxlen=_INTERVALS)  # Cycle and position.
         self._cycle = 0
-        self._is_bounded = False
+        self._is_bounded = True
 
     def step(self) -> None:
         """Advances one cycle."""
         self._cycle += 1
+
+    def reach(self) -> None:
+        """Notes that the joints have caught up with the targets."""
+        self._is_bounded = True
 
     def take(self, start: Sequence[float], q: Sequence[float]) -> float:
         """Takes the newest angles, and returns in how many cycles the tool may be there; 0 for targets too fast.
@@ -44,18 +50,18 @@ class StreamSpeed:
             q: The newest angles, n numbers, [rad].
         """
         points, position = self._points, self._model.forward(q).parts[1]
-        if points and self._cycle - points[-1][0] > _LONGEST_PERIOD:
+        here = self._model.forward(start).parts[1]
+        if not points or self._cycle - points[-1][0] > _LONGEST_PERIOD:
             points.clear()
+            points.append((self._cycle - _FIRST_PERIOD, here))
         length, speed, end = 0.0, inf, position
         for cycle, point in reversed(points):
             length, end = length + dist(point, end), point
             if cycle < self._cycle:
                 speed = min(speed, length / ((self._cycle - cycle) * CYCLE_TIME))
         points.append((self._cycle, position))
-        self._is_bounded = speed <= self.largest
-        if not self._is_bounded:
-            return 0.0
-        return dist(self._model.forward(start).parts[1], position) / (_INSIDE * self.largest * CYCLE_TIME)
+        self._is_bounded = self._is_bounded and speed <= self.largest
+        return dist(here, position) / (_INSIDE * self.largest * CYCLE_TIME) if self._is_bounded else 0.0
 
     def share(self, before: Sequence[float], after: Sequence[float]) -> float:
         """Returns the share of a step of one cycle that the tool may move, up to 1.

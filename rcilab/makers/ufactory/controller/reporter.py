@@ -12,6 +12,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.spatial import Pose
 from rcilab.makers.ufactory.bounds import JOINT_ACCELERATION, JOINT_VELOCITY, TOOL_ACCELERATION
 from rcilab.makers.ufactory.controller.xarm_controller import XArmController
+from rcilab.makers.ufactory.errors import UfactoryError
 from rcilab.makers.ufactory.wire.identity import FIRMWARE, Identity
 from rcilab.makers.ufactory.wire.poses import (
     MILLIMETRE,
@@ -23,6 +24,8 @@ from rcilab.makers.ufactory.wire.reports import HIGH_RATE, RICH, ReportLayout, R
 
 _AXES = 7  # On the wire, for every arm.
 _TEMPERATURE, _VOLTAGE = 30, 4800  # [deg C], [0.01 V]
+_OVERLOADED = (1, 33)
+"""Status and error of an overloaded drive, the only error of one here: client library, table of servo codes."""
 _SLOWEST = (0.1, 1.0, 1e-4, 0.01)
 """Least speed and acceleration of tool, [mm], and joints, [rad]: as the client library has them before any report."""
 
@@ -30,6 +33,12 @@ _SLOWEST = (0.1, 1.0, 1e-4, 0.01)
 def padded(values: list[float]) -> list[float]:
     """Returns joint values with zeros for the joints that the arm has not, 7 numbers."""
     return values + [0.0] * (_AXES - len(values))
+
+
+def servo_codes(controller: XArmController) -> bytes:
+    """Returns status and error of the drive of each joint, 14 bytes."""
+    failed = (controller.error or 0) - UfactoryError.JOINT_1
+    return b"".join(bytes(_OVERLOADED if joint == failed else (0, 0)) for joint in range(_AXES))
 
 
 def encode_report(controller: XArmController, identity: Identity, layout: ReportLayout) -> bytes:
@@ -100,6 +109,7 @@ def _rich(controller: XArmController, identity: Identity) -> dict[str, ReportVal
         ),
         "joint_limits": (settings.joint_jerk, weak_joint, JOINT_ACCELERATION, slow_joint, JOINT_VELOCITY),
         "rotation_limits": (limits.cartesian.rotation_jerk, limits.cartesian.rotation_acceleration),
+        "servo_codes": tuple(servo_codes(controller)),
         "temperatures": (_TEMPERATURE,) * n + (0,) * (_AXES - n),
         "tcp_speed": tool_speed_mm(controller),
         "joint_speeds": padded(controller.arm.measured_state.measured.dq.tolist()),

@@ -11,7 +11,7 @@ from rcilab.makers.ufactory.controller.information_requests import INFORMATION_H
 from rcilab.makers.ufactory.controller.io_requests import IO_HANDLERS, IoRequests
 from rcilab.makers.ufactory.controller.motion_requests import MOTIONS, handle_motion
 from rcilab.makers.ufactory.controller.pose_search import find_nearest_angles
-from rcilab.makers.ufactory.controller.reporter import padded, user_pose
+from rcilab.makers.ufactory.controller.reporter import padded, servo_codes, user_pose
 from rcilab.makers.ufactory.controller.settings import (
     MILLIMETRE,
     RESETTING,
@@ -218,12 +218,6 @@ def _pose_offset(values: tuple[Any, ...]) -> bytes:
     return encode_values("f", *(pose_as_mm_rotation if is_vector_out else pose_as_mm_rpy)(offset))
 
 
-def _servo_status(controller: XArmController) -> bytes:
-    error = controller.error or 0
-    joints = [(3, error) if error == 11 + k else (0, 0) for k in range(8)]
-    return bytes(number for pair in joints for number in pair)
-
-
 def _set(is_valid: bool, name: str, value: object, problem: str) -> bytes:
     if not is_valid:
         raise InvalidValueError(name, value, problem)
@@ -289,7 +283,7 @@ _SIMPLE: dict[Function, _Simple] = {
     Function.GET_POSE_OFFSET: lambda c, i, v: _pose_offset(v),
     Function.SERVO_READ_16: lambda c, i, v: bytes(4),
     Function.SERVO_READ_32: lambda c, i, v: bytes(4),
-    Function.SERVO_STATUS: lambda c, i, v: _servo_status(c),
+    Function.SERVO_STATUS: lambda c, i, v: servo_codes(c) + bytes(2),
     Function.GET_COMMON_PARAMETER: lambda c, i, v: _common_parameter(c, v[0]),
     Function.GET_POWER_VERSION: lambda c, i, v: bytes(6),
     Function.GET_HARDWARE_TYPES: lambda c, i, v: bytes(2),

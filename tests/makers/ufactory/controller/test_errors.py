@@ -10,9 +10,12 @@ import pytest
 
 from rcilab.core.errors import UsageError
 from rcilab.makers.ufactory.controller.modes import Mode, State
+from rcilab.makers.ufactory.controller.reporter import encode_report
 from rcilab.makers.ufactory.controller.xarm_controller import LARGEST_QUEUE
 from rcilab.makers.ufactory.wire.frame import STATUS_ERROR, STATUS_INVALID, STATUS_WARNING
 from rcilab.makers.ufactory.wire.functions import Function
+from rcilab.makers.ufactory.wire.identity import IDENTITIES
+from rcilab.makers.ufactory.wire.reports import RICH
 from rcilab.model.dynamics.payload import Payload
 from rcilab.sim.arm_setup import ArmSetup
 from tests.makers.ufactory.controller.conftest import ALL, Q6, Arm
@@ -202,6 +205,10 @@ def test_a_drive_at_its_largest_torque_is_the_error_of_its_joint_and_switches_mo
     arm.run(until=lambda: arm.controller.error is not None)
     assert arm.controller.error == 11
     assert arm.controller.enabled == 0
+    overloaded = bytes((1, 33)) + bytes(14)
+    assert arm.call(Function.SERVO_STATUS)[1] == overloaded
+    report = encode_report(arm.controller, IDENTITIES["xArm6"], RICH)
+    assert report[229:245] == overloaded
 
 
 def test_a_joint_that_is_pushed_faster_than_its_limit_is_an_error_in_motion() -> None:

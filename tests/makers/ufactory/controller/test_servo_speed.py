@@ -63,3 +63,16 @@ def test_a_client_that_stalls_is_not_an_error(arm: Arm, stall: int, lost: str) -
         assert arm.controller.error is None
         fastest = max(fastest, float(np.linalg.norm(arm.controller.arm.tool_c.twist[:3])))
     assert fastest < 1.001 * bound
+
+
+@pytest.mark.parametrize("before", [0, 100])
+def test_targets_that_jump_and_stay_are_an_error(arm: Arm, before: int) -> None:
+    """They come after a pause, or after others at the arm."""
+    arm.controller.set_up(ArmSetup(q=tuple(FAR)))
+    arm.ready(Mode.SERVO)
+    for cycle in range(before, 600):
+        if cycle % PERIOD == 0 and arm.controller.error is None:
+            angle = FAR[0] + (1.5 if cycle >= 100 else 0.0)
+            arm.call(Function.SERVO_JOINT, "10f", angle, *FAR[1:], *NOTHING)
+        arm.step()
+    assert arm.controller.error == 60
