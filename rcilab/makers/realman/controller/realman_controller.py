@@ -462,15 +462,17 @@ class RealManController:
         self._end_all()
 
     def _require_settable(self, joint: int) -> None:
-        require_joint(joint, self.model.n)
-        self._require_no_error(joint)
+        word = self.joint_errors[require_joint(joint, self.model.n) - 1]
+        if word:
+            raise _joint_error(joint, word)
         if self.enabled[joint - 1]:
             raise InvalidValueError("joint", joint, "is enabled; disable it with set_joint_en_state first")
 
     def _require_no_error(self, joint: int, word: int | None = None) -> None:
+        """Requires a joint that may move: a step of a stream is a warning."""
         word = self.joint_errors[joint - 1] if word is None else word
         if word & ~RealManError.JOINT_POSITION_STEP.code:
-            raise InvalidValueError("joint", joint, f"has the error 0x{word:04X}; set_joint_clear_err clears it")
+            raise _joint_error(joint, word)
 
     def _keep(self, parameters: JointParameters) -> None:
         self.parameters = parameters
@@ -517,3 +519,7 @@ class RealManController:
         if self._has_fault:
             return RobotMode.REFLEX
         return RobotMode.MOVE if is_moving else RobotMode.IDLE
+
+
+def _joint_error(joint: int, word: int) -> InvalidValueError:
+    return InvalidValueError("joint", joint, f"has the error 0x{word:04X}; set_joint_clear_err clears it")

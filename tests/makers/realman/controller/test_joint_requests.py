@@ -87,6 +87,19 @@ def test_an_enabled_joint_one_with_an_error_and_a_wrong_joint_refuse_changes(com
     assert bench.ask(command, **{field: wrong})[field] is False
 
 
+def test_a_joint_whose_stream_stepped_moves_and_refuses_changes_until_it_is_cleared():
+    bench = Bench()
+    q = bench.q
+    bench.send("movej_canfd", joint=[q[0] + 11000, *q[1:]], follow=True)
+    assert bench.ask("get_joint_err_flag")["err_flag"][0] == 0x4000
+    assert bench.ask("movej", joint=q, v=50)["receive_state"] is True
+    bench.run_until_event()
+    bench.ask("set_joint_en_state", joint_en_state=[1, 0])
+    assert bench.ask("set_joint_max_speed", joint_max_speed=[1, 20000])["joint_max_speed"] is False
+    bench.ask("set_joint_clear_err", joint_clear_err=1)
+    assert bench.ask("set_joint_max_speed", joint_max_speed=[1, 20000])["joint_max_speed"] is True
+
+
 def test_a_ratio_of_acceleration_to_speed_below_the_recommended_one_is_set_with_a_warning():
     bench = disabled()
     assert bench.ask("set_joint_max_acc", joint_max_acc=[2, 40000])["joint_max_acc"] is True
