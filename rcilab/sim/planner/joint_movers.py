@@ -299,13 +299,16 @@ class StreamMover:
         self._is_off = True
 
     def _keep_slow(self, before: MotionState) -> None:
-        """Shortens the step of this cycle to one that the tool may move; the joints accelerate less then.
+        """Shortens the step of this cycle to one that joints and tool may move; the joints accelerate less then.
 
         Args:
             before: The state at the start of this cycle.
         """
         axes = self._axes
         share = 1.0 if self._tool is None else self._tool.share(before.q, axes.q)
+        for x, x1, v_max in zip(before.q, axes.q, self._velocity, strict=True):
+            if share * abs(x1 - x) > v_max * CYCLE_TIME:
+                share = v_max * CYCLE_TIME / abs(x1 - x)
         if share < 1.0:
             dq = [share * v for v in axes.dq]
             ddq = [(v - v1) / CYCLE_TIME for v, v1 in zip(dq, before.dq, strict=True)]

@@ -76,3 +76,19 @@ def test_targets_that_jump_and_stay_are_an_error(arm: Arm, before: int) -> None:
             arm.call(Function.SERVO_JOINT, "10f", angle, *FAR[1:], *NOTHING)
         arm.step()
     assert arm.controller.error == 60
+
+
+@pytest.mark.parametrize("speed", [3.0, 4.0])
+def test_a_joint_is_not_faster_than_180_degrees_per_second_whatever_is_sent(arm: Arm, speed: float) -> None:
+    """Joint 6 moves the tool little; its client stalls once."""
+    arm.controller.set_up(ArmSetup(q=tuple(FAR)))
+    arm.ready(Mode.SERVO)
+    fastest = 0.0
+    for cycle in range(500):
+        if cycle % 4 == 0 and not 300 <= cycle < 340:
+            angle = FAR[5] + 1e-3 * speed * (cycle - min(cycle, 250) * (1.0 - min(cycle, 250) / 500))
+            arm.call(Function.SERVO_JOINT, "10f", *FAR[:5], angle, *NOTHING)
+        arm.step()
+        assert arm.controller.error is None
+        fastest = max(fastest, abs(arm.controller.arm.commanded.dq[5]))
+    assert fastest == pytest.approx(np.pi, rel=1e-3)
