@@ -8,6 +8,7 @@ after such a gap is not known (NaN).
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -113,7 +114,7 @@ class Signals:
         rows = self._table.raising(fault)
         found = [signal for row in rows for signal in self._signals(row) if signal.is_broken]
         signal = max(found, key=lambda signal: signal.excess, default=None)
-        facts = reason.facts if isinstance(reason, Remark) else {}
+        facts: Mapping[str, object] = reason.facts if isinstance(reason, Remark) else {}
         if signal is None or not signal.is_sensed or "value" not in facts or facts.get("joint", 0) != signal.axis:
             return signal
         seen = math.copysign(float(facts["value"]), signal.value)  # type: ignore[arg-type]
