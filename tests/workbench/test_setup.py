@@ -12,15 +12,24 @@ import pytest
 from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import outdated
 from rcilab.app.control_lock_actions import PageClosed, PageOpened
+from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import MoveJoint, PlanGoal, PoseGoal
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_draft import target_of
 from rcilab.app.request import Request, TypeField
 from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.run_actions import ChooseRobot, RobotCommand
-from rcilab.app.setup.configuration_state import SetupState, describe_held, describe_part, pending_parts, setup_obstacle
+from rcilab.app.setup.configuration_state import (
+    SetupState,
+    describe_held,
+    describe_part,
+    has_other_limits,
+    pending_parts,
+    setup_obstacle,
+)
 from rcilab.app.setup.setup_actions import MoveSetup, OpenTab, PressSetup, ResizeBox, SetSetup
 from rcilab.app.setup.setup_fields import FACE_NAMES, FIELD_NAMES, faces, read_field, with_field
+from rcilab.app.store import UiState
 from rcilab.app.text import Text
 from rcilab.app.view_actions import SetView
 from rcilab.control_process import SupervisorStatus
@@ -28,8 +37,9 @@ from rcilab.control_process.launch import start_controller
 from rcilab.core.errors import CommandRejectedError
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Message
-from rcilab.makers.configuration import SETUP_PARTS, RobotConfiguration
+from rcilab.makers.configuration import SETUP_PARTS, ControllerParameters, RobotConfiguration, SoftJointLimits
 from rcilab.makers.rokae import wire as rci
+from rcilab.model.robot_model import load_model
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.jog import reach_html
@@ -369,6 +379,22 @@ def test_after_check_again_the_setup_tab_has_a_verdict_on_the_plan(bench, ask):
     wait(lambda: "Passed" in panel._planned._shown, "a verdict")
     assert panel._planned._shown == planned_html(bench.store.state, bench.session.status(), Text("en"))
     assert panel._again.disabled
+
+
+def test_limits_that_the_controller_reports_and_plans_do_not_have_are_named():
+    model = load_model("RM75")
+    joint, state = model.limits.joint, UiState(model=model, goal=goal_at(model, model.home))
+
+    def differs(**reported):
+        return has_other_limits(state, SupervisorStatus(phase="idle", reported=RobotConfiguration(**reported)))
+
+    own = SoftJointLimits(lower=tuple(joint.lower + 2e-5), upper=tuple(joint.upper))
+    speeds = tuple(joint.velocity * (1.0 - 1e-5))
+    assert not differs()
+    assert not differs(joints=own, control=ControllerParameters(joint_velocity=speeds, collision_stage=(8.0,)))
+    assert differs(joints=replace(own, upper=(1.0, *own.upper[1:])))
+    assert differs(control=ControllerParameters(joint_velocity=(1.0, *speeds[1:])))
+    assert differs(control=ControllerParameters(tool_limits=(0.1, 1.6, 0.6, 4.0)))
 
 
 def test_the_setup_tab_asks_for_no_goal(bench, ask):

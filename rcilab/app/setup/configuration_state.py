@@ -7,7 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from rcilab.app.run.mode_parameters import is_control_pending
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.i18n.translator import Message, message
@@ -18,6 +20,7 @@ from rcilab.makers.configuration import (
     RobotConfiguration,
     SetupPart,
     SoftJointLimits,
+    tool_limits_of,
 )
 from rcilab.model.dynamics.payload import NO_LOAD, Payload
 from rcilab.robots import describe_robot
@@ -33,6 +36,7 @@ ON_FLANGE: tuple[SetupPart, ...] = ("tool", "load", "force")
 FORCE_AXES = {"world": ForceFrame.WORLD, "tool": ForceFrame.TOOL, "path": ForceFrame.PATH}
 
 _SAME_PLACE, _SAME_TURN = 1e-4, 1e-3  # [m], elements of a rotation: largest difference of two equal tools.
+_SAME_LIMIT, _SAME_ANGLE = 1e-3, 1e-4  # Share, [rad]: more than the rounding of an interface.
 _SEEN = 5e-5  # [m] A tool at a smaller distance from a face is on the face: it would be 0.0 mm outside.
 _FIRST_SETUP = RobotConfiguration(
     box=SafetyBox(size=(1.6, 1.6, 1.3), T_base_box=Pose((0.0, 0.0, 0.66)), active=False),
@@ -181,6 +185,25 @@ def differing_tool(state: UiState, status: SupervisorStatus) -> Message | None:
     away = float(np.abs(held.position - wanted.position).max())
     turned = float(np.abs(held.rotation - wanted.rotation).max())
     return _describe_pose(held) if away > _SAME_PLACE or turned > _SAME_TURN else None
+
+
+def has_other_limits(state: UiState, status: SupervisorStatus) -> bool:
+    """Returns whether the controller reports other limits of joints or tool than those of plans and checks."""
+    if status.phase != "idle" or is_control_pending(state.drive.control, status.setup.control):
+        return False
+    limits, reported = state.model.limits, status.reported
+    joint, joints, control = limits.joint, reported.joints, reported.control or {}
+    pairs: list[tuple[tuple[float, ...] | None, ArrayLike]] = [
+        (control.get("joint_velocity"), joint.velocity),
+        (control.get("joint_acceleration"), joint.acceleration),
+        (control.get("tool_limits"), tool_limits_of(limits)),
+    ]
+    if joints is not None:
+        pairs += [(joints.lower, joint.lower), (joints.upper, joint.upper)]
+    known = [
+        (held, own) for held, own in pairs if held is not None and len(held) == np.size(own)
+    ]  # Not of another arm.
+    return any(not np.allclose(held, own, rtol=_SAME_LIMIT, atol=_SAME_ANGLE) for held, own in known)
 
 
 def _describe_pose(pose: Pose) -> Message:

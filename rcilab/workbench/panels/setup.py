@@ -15,6 +15,7 @@ from rcilab.app.setup.configuration_state import (
     describe_part,
     describe_watched,
     differing_tool,
+    has_other_limits,
     name_parts,
     pending_parts,
     setup_obstacle,
@@ -106,6 +107,8 @@ class SetupPanel:
             return _verdict(tone, text(word), text.render(obstacle))
         if differing is not None:
             return _verdict("warn", text("setup.differs"), text("setup.differs_long", tool=text.render(differing)))
+        if has_other_limits(state, status):
+            return _verdict("warn", text("setup.other_limits"), text("setup.other_limits_long"))
         if any(field.startswith("setup.") for field in state.problems):
             return _verdict("warn", text("setup.rejected"), text("setup.rejected_long"))
         if not setup.touched:
