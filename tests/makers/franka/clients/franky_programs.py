@@ -12,7 +12,7 @@ from typing import Any
 import franky
 import numpy as np
 
-FACTOR = 0.15  # Of franky's limits, which are the Panda's: with more, poses accelerate joint 4 beyond the FR3's bound.
+FACTOR = 0.14  # Of franky's limits, which are the Panda's: with more, poses accelerate joint 4 beyond the FR3's bound.
 
 
 def open_robot(host: str) -> franky.Robot:
