@@ -44,6 +44,8 @@ class SignalState(NamedTuple):
 
     velocity: Array
     acceleration: Array
+    feed: Array
+    """Velocity of the command, within the bound."""
 
 
 def limit_rate(lag: Array, command_velocity: Array, last: SignalState, bounds: Bounds) -> SignalState:
@@ -61,16 +63,22 @@ def limit_rate(lag: Array, command_velocity: Array, last: SignalState, bounds: B
     """
     feed = np.clip(command_velocity, -bounds.velocity, bounds.velocity)
     remaining = lag - feed * CYCLE_TIME
-    velocity = np.clip(
-        feed + np.sign(remaining) * _closing_speed(np.abs(remaining), bounds), -bounds.velocity, bounds.velocity
-    )
-    acceleration = (velocity - last.velocity) / CYCLE_TIME
+    closing, slope = _closing_speed(np.abs(remaining), bounds)
+    wanted = feed + np.sign(remaining) * closing
+    velocity = np.clip(wanted, -bounds.velocity, bounds.velocity)
+    is_closing = velocity == wanted  # Otherwise it moves with the bound.
+    # Along the command, and along the closing speed, which decreases with the distance.
+    along = (feed - last.feed) / CYCLE_TIME - np.where(is_closing, slope, 0.0) * (last.velocity - last.feed)
+    error = velocity - last.velocity - along * CYCLE_TIME
+    size = np.abs(error)
+    most = np.where(is_closing, _max_acceleration(size, bounds.jerk), np.inf)
+    acceleration = along + np.sign(error) * np.minimum(size / CYCLE_TIME, most)
     highest = np.minimum(_max_acceleration(bounds.velocity - last.velocity, bounds.jerk), bounds.acceleration)
     lowest = -np.minimum(_max_acceleration(bounds.velocity + last.velocity, bounds.jerk), bounds.acceleration)
     acceleration = np.minimum(np.maximum(acceleration, lowest), highest)
     step = bounds.jerk * CYCLE_TIME
     acceleration = np.clip(acceleration, last.acceleration - step, last.acceleration + step)
-    return SignalState(last.velocity + acceleration * CYCLE_TIME, acceleration)
+    return SignalState(last.velocity + acceleration * CYCLE_TIME, acceleration, feed)
 
 
 def limit_vector_rate(lag: Array, command_velocity: Array, last: SignalState, bounds: Bounds) -> SignalState:
@@ -81,7 +89,7 @@ def limit_vector_rate(lag: Array, command_velocity: Array, last: SignalState, bo
     feed = _limit_length(command_velocity, bounds.velocity)
     remaining = lag - feed * CYCLE_TIME
     length = float(np.linalg.norm(remaining))
-    closing = remaining * (float(_closing_speed(length, bounds)) / length) if length > 0.0 else remaining
+    closing = remaining * (float(_closing_speed(length, bounds)[0]) / length) if length > 0.0 else remaining
     velocity = _limit_length(feed + closing, bounds.velocity)
     goal = _limit_length((velocity - last.velocity) / CYCLE_TIME, bounds.acceleration)
     # Reducing the acceleration is always allowed; the search goes from there towards the goal.
@@ -98,7 +106,7 @@ def limit_vector_rate(lag: Array, command_velocity: Array, last: SignalState, bo
             else:
                 high = middle
     acceleration = ease + low * (goal - ease)
-    return SignalState(last.velocity + acceleration * CYCLE_TIME, acceleration)
+    return SignalState(last.velocity + acceleration * CYCLE_TIME, acceleration, feed)
 
 
 class LowPass:
@@ -238,14 +246,16 @@ def is_near(sent: Command, requested: Command) -> bool:
     return True
 
 
-def _closing_speed(distance: Array | float, bounds: Bounds) -> Array | float:
-    """Returns the largest speed from which there is time to brake within a distance, acceleration and jerk limited.
+def _closing_speed(distance: Array | float, bounds: Bounds) -> tuple[Array | float, Array | float]:
+    """Returns the largest speed from which there is time to brake within a distance, and its slope over the distance.
 
     The stopping distance from speed v is v^2 / (2 a) + v a / (2 j), with the jerk's ramps (exact for v >= a^2 / j).
     """
     a = _BRAKING * bounds.acceleration
     ramp = a * a / (2.0 * bounds.jerk)
-    return np.minimum(_CATCH_UP * distance, np.sqrt(ramp * ramp + 2.0 * a * distance) - ramp)
+    speed = np.sqrt(ramp * ramp + 2.0 * a * distance) - ramp
+    near = _CATCH_UP * distance
+    return np.minimum(near, speed), np.where(near <= speed, _CATCH_UP, a / (speed + ramp))
 
 
 def _max_acceleration(room: Array, jerk: float | Array) -> Array:
@@ -277,7 +287,7 @@ def _bounds(velocity: float | Array, acceleration: float | Array, jerk: float | 
 
 
 def _standstill(size: int) -> SignalState:
-    return SignalState(np.zeros(size), np.zeros(size))
+    return SignalState(np.zeros(size), np.zeros(size), np.zeros(size))
 
 
 def _limit_length(vector: Array, longest: float | Array) -> Array:

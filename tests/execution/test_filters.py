@@ -173,6 +173,18 @@ def test_commands_of_any_period_keep_the_limits_over_that_period(period):
     assert smoothing(100.0, period) == pytest.approx(h / (h + 1.0 / (200.0 * math.pi)))
 
 
+@pytest.mark.parametrize(("name", "period"), [("xArm7", 1), ("xArm7", 5), ("Lite6", 5), ("RM65", 5), ("FR3", 1)])
+@pytest.mark.parametrize("jump", [0.003, 0.01, 0.05, 0.5])
+def test_a_jump_is_reached_where_an_acceleration_takes_long_to_change(name: str, period: int, jump: float) -> None:
+    model = load_model(name)
+    limiter = RateLimiter(model.limits, period)
+    limiter.begin(JointPosition(model.home))
+    goal = model.home + jump
+    rows = np.array([limiter.step(JointPosition(goal)).q for _ in range(2000 // period)])
+    assert np.abs(rows[-1] - goal).max() < 1e-9
+    assert (rows - goal).max() < 0.25 * jump
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_jumps_towards_the_ends_of_ranges_keep_velocity_bounds_that_decrease_there(seed: int) -> None:
     fr3 = load_model("FR3")

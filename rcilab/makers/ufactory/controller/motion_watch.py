@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rcilab.conformance.common_conditions import VELOCITY_ALLOWANCE
+from rcilab.i18n.rounding import format_pair
 from rcilab.i18n.translator import Remark
 from rcilab.makers.ufactory.bounds import JOINT_VELOCITY
 from rcilab.makers.ufactory.controller.settings import MILLIMETRE, Settings
@@ -90,7 +91,8 @@ class MotionWatch:
         bound = settings.servo_tool_speed(self._arm.model.limits)
         if speed <= bound * _SPEED_MARGIN:
             return None
-        text = f"the tool would move with {speed:.3g} m/s, faster than {bound:g} m/s"
+        fast, most = format_pair(speed, bound)
+        text = f"the tool would move with {fast} m/s, faster than {most} m/s"
         remark = Remark(text, "servo_speed", value=speed, bound=bound, unit="m/s")
         return Finding(UfactoryError.SERVO_LINEAR_SPEED, remark)
 
@@ -139,5 +141,6 @@ class GuidingWatch:
             error, bound = UfactoryError.MANUAL_MODE, _DETECTION_SPEED
         if speed <= bound:
             return None
-        text = f"joint {joint}: its speed of {speed:.3g} rad/s in mode 2 is above {bound:.3g} rad/s"
+        fast, most = format_pair(speed, bound)
+        text = f"joint {joint}: its speed of {fast} rad/s in mode 2 is above {most} rad/s"
         return Finding(error, Remark(text, "guided_speed", joint=joint, value=speed, bound=bound, unit="rad/s"))

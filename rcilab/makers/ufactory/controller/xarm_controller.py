@@ -83,6 +83,11 @@ _BUTTONS: dict[SafetyButton, UfactoryError] = {
     "gstop": UfactoryError.EMERGENCY_STOP_INPUT,
     "switch": UfactoryError.EMERGENCY_STOP_SWITCH,
 }
+_PRESSED: dict[SafetyButton, str] = {
+    "estop": "the emergency stop was pressed",
+    "gstop": "the input of the emergency stop was opened",
+    "switch": "the three-position switch was let go or pressed through",
+}
 _REFUSALS = {
     RefusalReason.JOINT_RANGE: UfactoryError.JOINT_RANGE,
     RefusalReason.GEOMETRY: UfactoryError.PLANNING,
@@ -276,7 +281,7 @@ class XArmController:
             return
         self.button = button
         if button != "none":
-            self.fail(_BUTTONS[button], Remark("the emergency stop was pressed", "estop"))
+            self.fail(_BUTTONS[button], Remark(_PRESSED[button], "estop"))
 
     def guide(self, on: bool) -> None:
         """Raises UsageError: this arm is guided in mode 2."""
