@@ -35,7 +35,13 @@ def test_the_page_has_what_its_interface_has_by_its_names(xarm7):
     page.open_tab("Setup")
     table = page.tab.locator("table.rl-setup:visible")
     page.wait(lambda: "TCP offset" in table.inner_text(), "the parts of this arm")
-    for shown in ("Safety boundary", "TCP load", "Reduced joint ranges", "Collision sensitivity", "0.1…500 rad/s³"):
+    for shown in (
+        "Safety boundary",
+        "TCP load",
+        "Reduced joint ranges",
+        "Collision sensitivity",
+        "Joint jerk 11459°/s³",
+    ):
         assert shown in table.inner_text()
     page.wait(lambda: "Joint ranges of reduced mode" in headings(page), "the ranges")
     assert "At a soft limit" not in headings(page)
