@@ -179,8 +179,8 @@ def test_an_arm_that_stands_outside_the_box_is_told_so_in_setup_and_beside_execu
     type_in(ask, box_xmax=f"{x + 0.5:.2f}")
     assert obstacle(bench.store.state, bench.session.status()).code == "ready.stale"
     wait(lambda: "Out of date" in panel._planned._shown, "Setup to look")
+    wait(lambda: "The controller uses what was set here: safety box" in panel._verdict._shown, "the confirmation")
     assert "Outside" not in panel._verdict._shown
-    assert "The controller uses what was set here: safety box" in panel._verdict._shown
     type_in(ask, box_xmax=f"{x - 74.03:.2f}")
     wait(lambda: "74.0 mm outside the safety box, past its +x face" in panel._verdict._shown, "Setup to say so")
     ask(PoseGoal(name="here"))
