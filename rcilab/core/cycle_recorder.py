@@ -6,6 +6,7 @@ import math
 import mmap
 import struct
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,5 +124,6 @@ class Recorder:
 def _reserve(size: int) -> mmap.mmap:
     """Returns memory whose pages cost nothing until they are written, each less than a microsecond then."""
     memory = mmap.mmap(-1, size)
-    memory.madvise(mmap.MADV_NOHUGEPAGE)  # To clear a huge one takes a part of the cycle.
+    with suppress(OSError):  # A kernel without huge pages.
+        memory.madvise(mmap.MADV_NOHUGEPAGE)  # To clear a huge one takes a part of the cycle.
     return memory
