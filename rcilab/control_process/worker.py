@@ -60,7 +60,7 @@ from rcilab.makers.maker import capabilities_of, commanded_start, timing_of
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import plan_stop
 from rcilab.realtime.cpu_latency import awake_cores
-from rcilab.realtime.scheduling import PRIORITY, enter_realtime
+from rcilab.realtime.scheduling import enter_realtime, loop_priority
 
 IDLE_STATE_TIMEOUT = 0.3  # [s] Without a state while idle until the connection counts as lost; a page waits 0.5 s.
 _POLL_PERIOD = 0.02  # [s] Longest wait in the idle loop, and time between two checks for the supervisor.
@@ -108,7 +108,7 @@ class ControlProcess:
         self._model.rigid_body.gravity(self._model.home)  # The first call loads the library: seconds from a cold disk.
         gc.collect()
         gc.freeze()  # The collection after a motion scans only what is newer.
-        granted = enter_realtime(PRIORITY)
+        granted = enter_realtime(loop_priority(timing_of(self._model).command_cycles))
         self._status.update(is_fifo=granted.policy == "SCHED_FIFO", memory_locked=granted.memory_locked)
         if granted.warning:
             print(granted.warning, file=sys.stderr, flush=True)

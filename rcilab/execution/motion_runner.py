@@ -22,7 +22,7 @@ from rcilab.execution.speed_override import SpeedOverride
 from rcilab.makers.driver import ConfiguredArm, StreamingDriver
 from rcilab.makers.maker import timing_of
 from rcilab.realtime.cpu_affinity import one_core
-from rcilab.realtime.scheduling import realtime_section
+from rcilab.realtime.scheduling import loop_priority, realtime_section
 from rcilab.recording.run import Run, build_run, describe_end
 from rcilab.recording.run_setup import Setup
 
@@ -135,12 +135,13 @@ class MotionRunner:
             Exception: An exception of the callback; the arm was stopped.
         """
         model = self._arm.model
+        timing = timing_of(model)
         time_needed = RECORD_TIME + (0.0 if plan is None else plan.duration)  # The motion may be held.
         capacity = math.ceil(time_needed / CYCLE_TIME) + _SPARE_CYCLES
         recorder = Recorder(model.n, capacity, complete=self._record_all)
         executor = MotionExecutor(
             self._driver,
-            CycleLog(recorder, state_cycles=timing_of(model).state_cycles),
+            CycleLog(recorder, state_cycles=timing.state_cycles),
             self._lock.reason_to_stop,
             model.limits,
             state_timeout=self._state_timeout,
@@ -164,7 +165,8 @@ class MotionRunner:
             return run
 
         try:
-            with self._lock.move(), realtime_section(self._realtime), one_core(self.partner):
+            priority = loop_priority(timing.command_cycles)
+            with self._lock.move(), realtime_section(self._realtime, priority), one_core(self.partner):
                 stopped = executor.run(
                     callback,
                     mode,

@@ -21,6 +21,8 @@ from rcilab.realtime.cpu_latency import awake_cores
 
 PRIORITY = 60  # SCHED_FIFO, of 1 to 99: below the kernel's own threads' usual 90s, above ordinary drivers' 50.
 
+_SLOWER_PRIORITY = 56  # Of a loop with a longer period than one cycle.
+
 _LOCK_CURRENT, _LOCK_FUTURE, _LOCK_ON_FAULT = 1, 2, 4  # Linux, mlockall(2).
 _CAP_IPC_LOCK = 14  # Linux, capabilities(7).
 
@@ -40,6 +42,15 @@ class Scheduling:
     """Whether the memory of this process cannot be swapped out."""
     warning: str | None
     """One line: what was refused and how to grant it; None if everything was granted."""
+
+
+def loop_priority(cycles: int) -> int:
+    """Returns the priority of a control loop: the shorter its period, the higher (rate-monotonic scheduling).
+
+    Args:
+        cycles: Its period in cycles of 1 ms, at least 1.
+    """
+    return PRIORITY if cycles == 1 else _SLOWER_PRIORITY
 
 
 def enter_realtime(priority: int) -> Scheduling:
@@ -86,17 +97,18 @@ def set_thread_scheduling(thread: threading.Thread, *, like_caller: bool) -> Non
 
 
 @contextmanager
-def realtime_section(enabled: bool = True) -> Iterator[None]:
+def realtime_section(enabled: bool = True, priority: int = PRIORITY) -> Iterator[None]:
     """Runs the body with all real-time conditions that the system grants; a missing one is logged once per process.
 
     Args:
         enabled: False has no effect: a loop in lock-step has no deadlines.
+        priority: Priority under SCHED_FIFO, 1 to 99.
     """
     global _warned
     if not enabled:
         yield
         return
-    scheduling = enter_realtime(PRIORITY)
+    scheduling = enter_realtime(priority)
     if scheduling.warning and not _warned:
         _warned = True
         _log.warning("%s", scheduling.warning)

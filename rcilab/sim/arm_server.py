@@ -57,6 +57,7 @@ from rcilab.sim.maker_server import MakerServer
 from rcilab.sim.simulation_port import SimulationPort
 
 PRIORITY = 80  # Under SCHED_FIFO; above the client's process, which it clocks.
+_SLOWER_PRIORITY = 58  # If no client answers each cycle: above its own client, below those that must answer each.
 LEAD_TIME = 0.0005  # [s] From the start of a cycle until its state is due; longer than almost any cycle takes.
 RESEND_TIME = 0.02  # [s] In lock-step a state is repeated until the first command arrives, after this time,
 _MAX_RESEND_TIME = 0.1  # [s] and then less often: a vendor's client sleeps for 1 s, and then answers every copy.
@@ -182,7 +183,7 @@ class ArmServer:
         if self._endpoint.warning:
             self._log.write("warning", self._endpoint.warning)
         if self.config.realtime:
-            warning = enter_realtime(PRIORITY).warning
+            warning = enter_realtime(PRIORITY if self._server.clocks_clients else _SLOWER_PRIORITY).warning
             if warning is not None and not self.config.lockstep:
                 self._log.write("warning", warning)
         parts = LogHandler(self._log)

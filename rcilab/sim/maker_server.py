@@ -178,6 +178,11 @@ class MakerServer(Protocol):
         ...
 
     @property
+    def clocks_clients(self) -> bool:
+        """Whether its clients answer the state of each cycle of a motion."""
+        ...
+
+    @property
     def is_quiet(self) -> bool:
         """Whether nothing moves and no response is pending: a cycle may then be computed early."""
         ...

@@ -100,6 +100,7 @@ class FciServer:
 
     scheme = "fci"
     patience = 0.02  # [s] A soft lock-step: clients on ordinary kernels jitter by milliseconds.
+    clocks_clients = True
 
     def __init__(self, controller: FciController, port: int, udp_port: int | None = None) -> None:
         self.controller = controller

@@ -66,6 +66,7 @@ class RealManServer:
 
     scheme = "realman"
     patience = 0.0
+    clocks_clients = False
 
     def __init__(self, controller: RealManController, port: int, generation: Generation = 3) -> None:
         self.controller = controller

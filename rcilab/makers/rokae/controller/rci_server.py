@@ -66,6 +66,7 @@ class RciServer:
 
     scheme = "rci"
     patience = 0.0  # A real controller does not wait, and --prefill absorbs jitter.
+    clocks_clients = True
 
     def __init__(self, controller: RciController, port: int, udp_port: int | None, client_port: int | None) -> None:
         self.controller = controller

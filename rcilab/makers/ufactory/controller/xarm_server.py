@@ -61,6 +61,7 @@ class XArmServer:
 
     scheme = "xarm"
     patience = 0.0
+    clocks_clients = False
 
     def __init__(self, controller: XArmController, port: int) -> None:
         self.controller = controller
