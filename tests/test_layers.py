@@ -51,7 +51,7 @@ FENCES = {
     "pink": ("diagnostics/bench/compare/",),
     "ssik": ("diagnostics/bench/compare/",),
     "toppra": ("diagnostics/bench/compare/",),
-    "pylibfranka": ("makers/franka/driver/",),
+    "pylibfranka": ("makers/franka/driver/", "diagnostics/bench/official_clients.py"),
     "panda_py": ("makers/franka/driver/",),
 }
 

@@ -1,7 +1,4 @@
-"""One controller of each maker on this machine, all driven at the same time, each by a client library of its own.
-
-`python -m rcilab.diagnostics.bench.four_makers ADDRESS SECONDS` drives one of them and prints what it found as JSON.
-"""
+"""A controller of each maker on this machine, all driven at the same time, each by the client library of its maker."""
 
 from __future__ import annotations
 
@@ -11,7 +8,6 @@ import sys
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass
-from itertools import cycle
 from pathlib import Path
 from tempfile import TemporaryFile
 from types import MappingProxyType
@@ -22,9 +18,8 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import ConnectionLostError
 from rcilab.core.optional_deps import Extra, MissingExtraError, require_installed
 from rcilab.diagnostics.bench.child_guard import guard, launch
+from rcilab.diagnostics.bench.cpu_stall_monitor import CpuStallMonitor
 from rcilab.diagnostics.bench.measure import Absent, Measurement, summarise
-from rcilab.execution.connect import connect
-from rcilab.motion.joint import plan_joint
 
 ARMS = ("xMatePro7", "FR3", "xArm7", "RM75")
 _LIBRARIES: MappingProxyType[str, Extra] = MappingProxyType(
@@ -32,8 +27,6 @@ _LIBRARIES: MappingProxyType[str, Extra] = MappingProxyType(
 )
 """Of the clients, and the extra of each; the xMate is driven by rcilab itself."""
 
-_REACH = 0.2  # [rad] Of each joint, there and back.
-_SPEED = 0.1  # Of the joints' own.
 _WARM_UP = 6.0  # [s] In which the clients start, on a busy machine.
 _END_TIMEOUT = 60.0  # [s] Of a client, after the time is over.
 
@@ -50,7 +43,7 @@ class Driven:
     motions: int
     """Motions that the client executed, each to its end."""
     lost: int
-    """Cycles of the controller that the client did not answer, during these motions."""
+    """Cycles of these motions without a command of their own, where the client streams."""
 
 
 def bench_four_makers(seconds: float = 10.0) -> Measurement | Absent:
@@ -60,9 +53,13 @@ def bench_four_makers(seconds: float = 10.0) -> Measurement | Absent:
             require_installed(library, "this row", extra)
     except MissingExtraError as error:
         return Absent(name="four_makers", note=str(error))
-    found = drive_together(_WARM_UP + seconds, _WARM_UP)
+    with CpuStallMonitor() as stalls:
+        found = drive_together(_WARM_UP + seconds, _WARM_UP)
     arms = ", ".join(f"{arm.name} {1e6 * CYCLE_TIME * arm.cpu:.0f} us ({arm.lost} lost)" for arm in found)
-    note = f"{arms}; each driven by its own client library for {seconds:g} s"
+    note = (
+        f"{arms}; each driven by the library of its maker for {seconds:g} s; empty loops with the highest priority "
+        f"were late by {1e3 * float(stalls.lateness.max()):.1f} ms at most"
+    )
     return summarise("four_makers", [CYCLE_TIME * arm.cpu for arm in found], "us", None, note)
 
 
@@ -85,7 +82,7 @@ def drive_together(seconds: float, warm_up: float) -> list[Driven]:
         clients = []
         for controller in controllers:
             outputs.append(stack.enter_context(TemporaryFile("w+")))
-            command = [sys.executable, "-m", "rcilab.diagnostics.bench.four_makers", controller.address or ""]
+            command = [sys.executable, "-m", "rcilab.diagnostics.bench.official_clients", controller.address or ""]
             clients.append(stack.enter_context(guard([*command, str(seconds)], output=outputs[-1])))
             launch(clients[-1])
         pids = [controller.pid or 0 for controller in controllers]
@@ -119,21 +116,3 @@ def _cpu_time(pid: int) -> float:
 def _memory(pid: int) -> int:
     """Returns the resident memory of a process, [bytes]."""
     return int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGESIZE")
-
-
-def _drive(address: str, seconds: float) -> dict[str, int]:
-    """Moves an arm there and back until the time is over; a motion that has begun is completed."""
-    motions = lost = 0
-    with connect(address) as robot:
-        robot.power_on()
-        end = time.monotonic() + seconds
-        start = robot.state.q_c
-        goals = cycle((start + _REACH, start))
-        while time.monotonic() < end:
-            run = robot.execute(plan_joint(robot.model, robot.state.q_c, next(goals), speed=_SPEED))
-            motions, lost = motions + 1, lost + run.timing.lost
-    return {"motions": motions, "lost": lost}
-
-
-if __name__ == "__main__":
-    print(json.dumps(_drive(sys.argv[1], float(sys.argv[2]))))
