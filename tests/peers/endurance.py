@@ -19,7 +19,7 @@ from tests.peers.robot import PATIENCE, Output, Robot
 from tests.peers.wire import State
 
 GROWTH = 1_000_000  # [bytes] What memory may grow by.
-_PRIORITY = 70  # Below the controller's.
+_PRIORITY = 57  # Below every controller's.
 _BATCH = 50  # Datagrams between two looks at the state.
 PATIENT = {"start_sleep": 0.0, "receive_timeout": PATIENCE, "first_timeout": PATIENCE}
 
