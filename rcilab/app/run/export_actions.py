@@ -86,7 +86,7 @@ class ExportActions:
             return
         if run is None:
             self._store.notify("warn", message("export.nothing"))
-        elif self._worker is not None and self._worker.is_alive():
+        elif self._store.state.export is not None:  # What the page shows; the thread ends a moment later.
             self._store.notify("warn", message("export.busy"))
         else:
             self._cancelled.clear()

@@ -11,6 +11,9 @@ import sys
 import time
 from typing import Any
 
+_KEPT: list[Any] = []
+"""Callbacks. The library may call one after its push is off and its robot deleted, and crashes if it is gone by then."""
+
 
 def joint_commands(robot: Any, n: int) -> dict[str, Any]:
     """Calls every method of JointConfigSettings and JointConfigReader."""
@@ -135,6 +138,7 @@ def five(host: str, ports: list[int]) -> dict[str, Any]:
     }
     pushed: list[float] = []
     callback = rm_realtime_arm_state_callback_ptr(lambda state: pushed.append(state.joint_status.joint_position[0]))
+    _KEPT.append(callback)
     robots[0].rm_realtime_arm_state_call_back(callback)
     robots[0].rm_set_realtime_push(rm_realtime_push_config_t(2, True, push_port, 0, host, rm_udp_custom_config_t()))
     start = [0, -20, -70, 0, -90, 0]
@@ -144,7 +148,6 @@ def five(host: str, ports: list[int]) -> dict[str, Any]:
     time.sleep(0.5)
     found["pushed"] = len(pushed)
     robots[0].rm_set_realtime_push(rm_realtime_push_config_t(2, False, push_port, 0, host, rm_udp_custom_config_t()))
-    time.sleep(0.1)  # The callback may still run.
     for robot in robots:
         robot.rm_delete_robot_arm()
     return found

@@ -9,9 +9,11 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 
+from rcilab.control_process.launch import start_controller
 from tests.peers.arena import Process
 
 pytest.importorskip("Robotic_Arm", reason="needs the extra realman")
@@ -117,10 +119,14 @@ def test_a_program_is_recorded_stored_and_run(served: tuple[str, Process], tmp_p
 
 
 def test_one_program_has_five_robots_of_both_generations_and_receives_their_states(tmp_path: Path):
-    options = [[], [], [], ["--generation", "4"], ["--generation", "4"]]
     with ExitStack() as stack:
-        processes = [stack.enter_context(Process("--host", "127.0.0.1", *extra, model="RM65")) for extra in options]
-        command = [sys.executable, str(PROGRAM), "127.0.0.1", ",".join(str(p.port) for p in processes), "2", "five"]
+        ports = []
+        for generation in (3, 3, 3, 4, 4):
+            options = ("--host", "127.0.0.1", "--generation", str(generation))
+            controller = start_controller("RM65", options=options)
+            stack.callback(controller.end)
+            ports.append(str(urlsplit(controller.address).port))
+        command = [sys.executable, str(PROGRAM), "127.0.0.1", ",".join(ports), "2", "five"]
         output = subprocess.run(
             command,
             capture_output=True,
