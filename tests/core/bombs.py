@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import struct
 import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,8 @@ import numpy as np
 import rcilab
 from rcilab.recording.chunks import encode_chunk, encode_header
 
+FAST = 1
+"""Level of compression: zeros become small at each."""
 _MODEL = rcilab.load_model("xMatePro7")
 _TOO_LARGE = "MB, unpacked, are more than 1024.0"
 
@@ -23,7 +26,7 @@ def motion_with(name: str, head: bytes, zeros: int = 0) -> Callable[[Path], None
     def make(path: Path) -> None:
         rcilab.plan_joint(_MODEL, _MODEL.home, _MODEL.home + 0.1).save(path)
         parts = {**dict(np.load(path)), "goal": np.zeros(1), "breaks": np.zeros(2)}
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=FAST) as file:
             for key in (key for key in parts if key != name):
                 with file.open(f"{key}.npy", "w") as stream:
                     np.lib.format.write_array(stream, parts[key])
@@ -33,6 +36,17 @@ def motion_with(name: str, head: bytes, zeros: int = 0) -> Callable[[Path], None
                     stream.write(bytes(1_000_000))
 
     return make
+
+
+def packed_zeros(count: int) -> bytes:
+    """Returns what zlib makes of so many zeros: one block, which is made once, again and again."""
+    block, rest = 1_000_000, count % 1_000_000
+    pack, last = zlib.compressobj(9, wbits=-15), zlib.compressobj(9, wbits=-15)
+    again = pack.compress(bytes(block)) + pack.flush(zlib.Z_FULL_FLUSH)
+    checksum = (count % 65521) << 16 | 1  # Adler-32 of zeros.
+    return (
+        b"\x78\xda" + count // block * again + last.compress(bytes(rest)) + last.flush() + struct.pack(">I", checksum)
+    )
 
 
 def array_header(kind: str, shape: str) -> bytes:

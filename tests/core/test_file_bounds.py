@@ -10,7 +10,6 @@ import subprocess
 import sys
 import tracemalloc
 import zipfile
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
 from rcilab.motion import Motion, Program, Waypoint
 from rcilab.recording.chunks import encode_chunk, encode_header
-from tests.core.bombs import BOMBS
+from tests.core.bombs import BOMBS, FAST, packed_zeros
 from tests.recording.runs import export_run, some_run
 
 MODEL = rcilab.load_model("xMatePro7")
@@ -36,9 +35,7 @@ def recording(path: Path) -> Path:
     size = run.cycles.dtype.itemsize
     head = {"arm": None, "fields": fields, "bytes": size, "realtime": True, "setup": {}, "report": None}
     rows = 900_000
-    pack, zeros = zlib.compressobj(9), bytes(size * 1000)
-    packed = b"".join(pack.compress(zeros) for _ in range(rows // 1000)) + pack.flush()
-    block = encode_chunk("CYCL", struct.pack("<I", rows) + packed)
+    block = encode_chunk("CYCL", struct.pack("<I", rows) + packed_zeros(size * rows))
     path.write_bytes(encode_header() + encode_chunk("HEAD", json.dumps(head).encode()) + 10 * block)
     return path
 
@@ -50,31 +47,29 @@ def broad(path: Path) -> Path:
     fields = [[name, kind, [shape[0] + 4096 - size] if name == "reserved" else shape] for name, kind, shape in fields]
     head = {"arm": None, "fields": fields, "bytes": 4096, "realtime": True, "setup": {}, "report": None}
     rows = 1_000_000
-    pack, zeros = zlib.compressobj(1), bytes(4096 * 1000)
-    packed = b"".join(pack.compress(zeros) for _ in range(rows // 1000)) + pack.flush()
-    block = encode_chunk("CYCL", struct.pack("<I", rows) + packed)
+    block = encode_chunk("CYCL", struct.pack("<I", rows) + packed_zeros(4096 * rows))
     path.write_bytes(encode_header() + encode_chunk("HEAD", json.dumps(head).encode()) + block)
     return path
 
 
 def within(path: Path) -> Path:
-    """Coefficients of 0.9 GB, zeros: below what a file may hold, and above what there is room for."""
-    return archive(path, pieces=4_000_000, order=4, breaks=4_000_001)
+    """Coefficients of 0.6 GB, zeros: below what a file may hold, and with a copy above what there is room for."""
+    return archive(path, pieces=2_800_000, order=4, breaks=2_800_001)
 
 
 def unfit(path: Path) -> Path:
     """As many bytes, of which the headers alone say that they do not fit together."""
-    return archive(path, pieces=4_000_000, order=4)
+    return archive(path, pieces=2_800_000, order=4)
 
 
 def archive(path: Path, pieces: int = 1_300_000, order: int = 18, breaks: int | None = None) -> Path:
-    """Coefficients of 1.3 GB, zeros, in 1.3 MB."""
+    """Coefficients of 1.3 GB, zeros, in a few megabytes."""
     motion = rcilab.plan_joint(MODEL, MODEL.home, MODEL.home + 0.1)
     motion.save(path)
     parts = dict(np.load(path))
     if breaks is not None:
         parts["breaks"] = np.zeros(breaks)
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=FAST) as file:
         for name, array in parts.items():
             with file.open(f"{name}.npy", "w", force_zip64=True) as stream:
                 if name == "coefficients":

@@ -6,6 +6,7 @@ import pytest
 
 from tests.peers import endurance, programs
 from tests.peers.arena import PLANTS
+from tests.peers.test_start_of_motion import STARTS, begin_in_every_mode
 
 pytestmark = pytest.mark.endurance
 
@@ -29,6 +30,12 @@ def test_ten_minutes_of_streaming_lose_nothing_and_leave_memory_flat(plant: str)
 @pytest.mark.parametrize("plant", PLANTS)
 def test_ten_thousand_motions_leave_no_trace(plant: str) -> None:
     endurance.run_motions(plant, 10_000, warm_up=500)
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("where", STARTS)
+def test_every_mode_begins_after_every_mode_again_and_again(where: str, plant: str) -> None:
+    begin_in_every_mode(where, plant, 50)
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -20,6 +20,7 @@ from tests.fuzz.noise import spoilt
 from tests.makers.rokae.controller.test_server import running
 from tests.workbench.opened import opened, wait
 
+CLOSING_TIME = 0.1  # [s] What has not read all that was sent to it waits in vain for the answer to its goodbye.
 _REQUESTS: tuple[dict[str, Any], ...] = (
     {"request": "status"},
     {"request": "push", "wrench": [0, 0, -20, 0, 0, 0], "duration": 1},
@@ -95,7 +96,7 @@ def _enter(bench: Workbench) -> ClientConnection:
     protocol: Any = f"viser-v{viser.__version__}"
     link = connect(
         f"ws://127.0.0.1:{bench.port}/", additional_headers={"Origin": f"http://127.0.0.1:{bench.port}"},
-        subprotocols=[protocol], max_size=None, ping_interval=None,
+        subprotocols=[protocol], max_size=None, ping_interval=None, close_timeout=CLOSING_TIME,
     )  # fmt: skip
     link.recv(timeout=30.0)
     return link
@@ -115,7 +116,11 @@ def open_page(bench: Workbench, *, reads: bool = True) -> Iterator[ClientConnect
     with (
         _enter(bench) as link,
         connect(
-            f"ws://127.0.0.1:{bench.port}/rcilab/live", additional_headers=origin, max_size=None, ping_interval=None
+            f"ws://127.0.0.1:{bench.port}/rcilab/live",
+            additional_headers=origin,
+            max_size=None,
+            ping_interval=None,
+            close_timeout=CLOSING_TIME,
         ) as bar,
     ):
         link.send(camera)

@@ -17,11 +17,12 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from rcilab.views.access_control import AccessPolicy
-from rcilab.views.pending_connections import MAX_PENDING
+from rcilab.views.pending_connections import BACKLOG, MAX_PENDING
 from rcilab.views.viser_ext.message_guard import is_bounded
 from rcilab.views.viser_server import GuardedServer, listen
 
 PROTOCOL = f"viser-v{viser.__version__}"
+CLOSING_TIME = 0.1  # [s] A page that has not read all that was sent to it waits in vain for the answer to its goodbye.
 
 
 @pytest.fixture(scope="module")
@@ -147,8 +148,13 @@ def answer_to(port: int, request_line: str, *headers: str) -> int:
 
 
 def open_page(port: int):
-    origin = {"Origin": f"http://127.0.0.1:{port}"}
-    return connect(f"ws://127.0.0.1:{port}/", additional_headers=origin, subprotocols=[PROTOCOL], compression=None)  # type: ignore[list-item]
+    return connect(
+        f"ws://127.0.0.1:{port}/",
+        additional_headers={"Origin": f"http://127.0.0.1:{port}"},
+        subprotocols=[PROTOCOL],  # type: ignore[list-item]
+        compression=None,
+        close_timeout=CLOSING_TIME,
+    )
 
 
 def test_text_that_is_no_unicode_ends_no_page(guarded) -> None:
@@ -166,7 +172,11 @@ def test_text_that_is_no_unicode_ends_no_page(guarded) -> None:
 
 def test_who_only_connects_takes_nobodys_place(guarded) -> None:
     _, port = guarded
-    idle = [socket.create_connection(("127.0.0.1", port)) for _ in range(3 * MAX_PENDING)]
+    idle: list[socket.socket] = []
+    for _ in range(3 * MAX_PENDING):
+        idle.append(socket.create_connection(("127.0.0.1", port)))
+        if len(idle) % (BACKLOG // 2) == 0:  # More than are accepted at a time would come again only a second later.
+            assert fetch(port, f"127.0.0.1:{port}")[0] == 200
     try:
         assert fetch(port, f"127.0.0.1:{port}")[0] == 200
         with open_page(port) as page:
@@ -188,7 +198,7 @@ from rcilab.views.viser_server import GuardedServer, listen
 bound = listen("127.0.0.1", 0)
 port = bound.getsockname()[1]
 server = GuardedServer(bound, AccessPolicy(host="127.0.0.1", port=port))
-links = [socket.socket() for _ in range(60)]
+links = [socket.socket() for _ in range(12)]  # Fewer than are accepted at a time: others wait to come again.
 resource.setrlimit(resource.RLIMIT_NOFILE, (links[-1].fileno() + 1, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
 for link in links:
     link.setblocking(False)
@@ -200,6 +210,7 @@ time.sleep(1.5)
 page = socket.create_connection(("127.0.0.1", port), timeout=10)
 page.sendall(f"GET / HTTP/1.1\\r\\nHost: 127.0.0.1:{port}\\r\\n\\r\\n".encode())
 print(page.recv(12).decode())
+page.close()
 server.close()
 """
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)

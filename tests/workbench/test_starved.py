@@ -16,7 +16,7 @@ PLANTS = ("ideal", "mujoco")
 
 
 def test_motions_with_a_page_leave_memory_flat() -> None:
-    starved.stream_with_a_page("ideal", 25.0, 10.0)
+    starved.stream_with_a_page("ideal", 18.0, 10.0)
 
 
 def test_processes_that_stood_still_leave_an_arm_at_rest_and_work_goes_on() -> None:

@@ -11,7 +11,7 @@ def test_four_makers_are_driven_at_the_same_time() -> None:
     """The short version of `tests/endurance`, which also asks for memory and lost cycles."""
     for library in ("pylibfranka", "xarm", "Robotic_Arm"):
         pytest.importorskip(library)
-    found = drive_together(6.0, warm_up=3.0)
+    found = drive_together(3.0, warm_up=1.5)
     assert [arm.name for arm in found] == list(ARMS)
     for arm in found:
         assert arm.motions > 0
