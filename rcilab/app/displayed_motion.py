@@ -9,6 +9,7 @@ from rcilab.app.planning import Plan, build_plan_view
 from rcilab.conformance.check import check
 from rcilab.motion import Motion
 from rcilab.recording.run import Run
+from rcilab.recording.run_setup import Setup
 
 if TYPE_CHECKING:
     from rcilab.app.fault_lab.fault_demo import FaultDemo
@@ -44,7 +45,7 @@ def display_fault(demo: FaultDemo) -> DisplayedMotion:
     return DisplayedMotion(
         plan=draw(commanded),
         scene=draw(demo.moved),
-        run=Run(plan=commanded, cycles=demo.whole, model=demo.model),
+        run=Run(plan=commanded, cycles=demo.whole, model=demo.model, setup=Setup(mode=demo.scenario.mode)),
         moment=demo.time,
     )
 

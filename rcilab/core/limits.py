@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from types import MappingProxyType
 from typing import Literal
@@ -81,6 +81,16 @@ class JointLimits:
             for room in (q - own.lower, own.upper - q)
         )
         return -down, up
+
+    def in_mode(self, mode: str) -> JointLimits:
+        """Returns the limits to which curves of a motion are compared.
+
+        Commanded torques have no joint angles: their velocities are bounded where they are measured, everywhere alike.
+
+        Args:
+            mode: Control mode, such as "torque"; "" if it is not known.
+        """
+        return replace(self, near_ends=None) if mode == "torque" else self
 
     def checked_velocity_bounds(self, q: Array) -> tuple[Array, Array]:
         """Returns the bounds of the check, and of plans: as `velocity_bounds`, but at least `EndVelocity.rounding`."""

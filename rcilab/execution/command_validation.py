@@ -21,6 +21,8 @@ START_TOLERANCE = 1e-6  # [rad] or [m] Such an offset makes a jerk of 1000 rad/s
 _ARRIVED = 1e-12  # [rad] Commanded angles return over the wire unchanged, except for the sign of zero.
 _POSE_ARRIVED = 1e-9  # [m], or an element of a rotation: a controller may normalise the pose.
 _LONGEST_TOOL = 0.5  # [m] Tuning value: a longer one is another pose rather than another tool.
+_TOOL_STEP, _TOOL_ROUNDING = 1e-4, 1e-6  # [m] Tools are given in tenths of a millimetre; positions may be rounded.
+_START = np.format_float_scientific(START_POSITION_TOLERANCE, trim="-", exp_digits=1)  # "1e-9"
 _START_ADVICE = (
     "plan the motion from robot.state.q_c, or move the arm to its start first: "
     "robot.execute(plan_joint(robot.model, robot.state.q_c, motion.q[0]))"
@@ -74,7 +76,7 @@ def find_start_mismatch(start: JointVector, q_c: JointVector, advice: str = _STA
     return (
         f"the motion does not start at the arm's position: joint {joint + 1} starts at "
         f"{math.degrees(start[joint]):.4f} deg and is at {math.degrees(q_c[joint]):.4f} deg, "
-        f"{math.degrees(off[joint]):.2g} deg apart{more} (tolerance {math.degrees(START_POSITION_TOLERANCE):.0e} deg); "
+        f"{math.degrees(off[joint]):.2g} deg apart{more} (tolerance {_START} rad); "
         f"{advice}"
     )
 
@@ -103,7 +105,7 @@ def require_start(
                 np.degrees(command.q).round(3).tolist(),
                 f"deg must be the present position: joint {joint + 1} is commanded to "
                 f"{math.degrees(command.q[joint]):.4f} deg and is at {math.degrees(state.q_c[joint]):.4f} deg, "
-                f"{math.degrees(off[joint]):.4f} deg apart (tolerance {math.degrees(START_TOLERANCE):.1g} deg); "
+                f"{math.degrees(off[joint]):.4f} deg apart (tolerance {math.degrees(START_TOLERANCE):.5f} deg); "
                 "begin with state.q_c",
             )
     elif isinstance(command, CartesianPosition):
@@ -122,7 +124,7 @@ def require_start(
                     "psi of the first command",
                     round(math.degrees(command.psi), 4),
                     f"deg must be the present one: the arm angle is {math.degrees(state.psi_c):.4f} deg, "
-                    f"{math.degrees(off):.4f} deg apart (tolerance {math.degrees(START_TOLERANCE):.1g} deg); begin "
+                    f"{math.degrees(off):.4f} deg apart (tolerance {math.degrees(START_TOLERANCE):.5f} deg); begin "
                     "with state.psi_c, or with None to hold it",
                 )
     else:
@@ -139,10 +141,15 @@ def require_start(
 
 
 def _describe_other_tool(command: CartesianPosition, state: RobotState, T_flange_tool: Pose) -> str:
-    """Returns which tool gives the commanded pose at the arm's angles, if that may be the cause of a difference."""
+    """Returns which tool gives the commanded pose at the arm's angles, if that may be the cause of a difference.
+
+    Any other pose gives a tool, too, but hardly one that its user could have typed.
+    """
     T_base_flange = state.T_base_tool_c @ T_flange_tool.inverse()
     implied = (T_base_flange.inverse() @ as_pose(command.T_base_tool)).position
-    if float(np.linalg.norm(implied)) > _LONGEST_TOOL:
+    is_typed = np.abs(implied - _TOOL_STEP * np.round(implied / _TOOL_STEP)).max() < _TOOL_ROUNDING
+    is_other = np.abs(implied - T_flange_tool.position).max() > _TOOL_ROUNDING
+    if not (is_typed and is_other) or float(np.linalg.norm(implied)) > _LONGEST_TOOL:
         return ""
     positions = np.round(1e3 * np.array((implied, T_flange_tool.position)), 1) + 0.0  # No minus sign before zero.
     theirs, ours = (", ".join(map(str, position)) for position in positions.tolist())

@@ -81,13 +81,14 @@ class MotionPlot(Part):
 
     def _draw(self) -> None:
         state = self.state
-        plan = None if state.shown_plan is None else state.shown_plan.motion
-        if plan is None:
+        shown = state.shown_plan
+        if shown is None:
             write(self._curves, soft(self.text("timeline.nothing")))
             write(self._kinds, "")
             self._move_cursor()
             return
-        joint, limits, run = int(self.joint.value), self.model.limits.joint, state.shown_run
+        joint, plan, run = int(self.joint.value), shown.motion, state.shown_run
+        limits = self.model.limits.joint.in_mode(shown.mode if run is None else run.setup.mode)
         is_scaled = run is not None and run.has_speed_override
         times = None if run is None else run.t - run.delay * CYCLE_TIME
         panels: list[Panel] = []

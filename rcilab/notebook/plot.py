@@ -94,7 +94,7 @@ def plot(
 
 def _draw(motion: Motion, model: RobotModel, run: Run | None, chosen: Sequence[int], text: Text) -> Figure:
     report = check(motion, model)
-    panels = _panels(motion, model.limits.joint, run)
+    panels = _panels(motion, model.limits.joint.in_mode("" if run is None else run.setup.mode), run)
     figure = _new_figure(len(panels) + (run is not None))
     axes: list[Axes] = list(figure.axes)
     for panel, ax in zip(panels, axes, strict=False):

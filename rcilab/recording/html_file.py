@@ -137,7 +137,7 @@ def _pack_run(run: Run, tracking: Tracking, scales: dict[str, PlotScale], packed
         packs["dq_plan"] = packed.add(factor["dq"] * velocity[rows].T)
     limits = None
     if run.model is not None:
-        joint = run.model.limits.joint
+        joint = run.model.limits.joint.in_mode(run.setup.mode)
         bounds: dict[str, tuple[NDArray[Any], NDArray[Any]]] = {
             "q": (joint.lower, joint.upper),
             "dq": (-joint.velocity, joint.velocity),
@@ -145,7 +145,7 @@ def _pack_run(run: Run, tracking: Tracking, scales: dict[str, PlotScale], packed
         }
         limits = {name: [(factor[name] * side).tolist() for side in pair] for name, pair in bounds.items()}
         if joint.near_ends is not None:
-            lowest, highest = joint.velocity_bounds(run.q)
+            lowest, highest = joint.velocity_bounds(run.q_c)
             packs["dq_lowest"] = packed.add(factor["dq"] * lowest.T)
             packs["dq_highest"] = packed.add(factor["dq"] * highest.T)
     return {"n": run.q.shape[1], "arrays": packs, "limits": limits}

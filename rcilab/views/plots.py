@@ -205,6 +205,8 @@ def streamed_curves(q: JointPath, quantity: Quantity, model: RobotModel | None =
 def recorded_curves(t: Array, q: Array, q_c: Array, dq: Array, quantity: Quantity, *, rounding: float = 0.0) -> Curves:
     """Returns a recorded signal: measured q and dq, or ddq and jerk of the commands, as the controller computes them.
 
+    Velocity limits that depend on the angles are those of commands, at commanded angles.
+
     Args:
         t: Time since the first command, [s], shape (N,).
         q: Measured joint angles, [rad], shape (N, n).
@@ -216,7 +218,7 @@ def recorded_curves(t: Array, q: Array, q_c: Array, dq: Array, quantity: Quantit
     if quantity == "q":
         return Curves(t=t, values=q)
     if quantity == "dq":
-        return Curves(t=t, values=dq, q=_shifted(q))
+        return Curves(t=t, values=dq, q=_shifted(q_c))
     order = 2 if quantity == "ddq" else 3
     return Curves(t=t, values=backward_differences(t, q_c, order), rounding=rounding * (2.0 / CYCLE_TIME) ** order)
 
@@ -324,11 +326,16 @@ def build_frame(
     lower, upper = (factor * float(low[joint - 1]), factor * float(high[joint - 1])) if joint else (-100.0, 100.0)
     rounding = 0.0 if actual is None else actual.rounding * (factor if joint else 100.0 / float(high.min()))
     frame = _frame(plan, actual, shown, lower, upper, buckets, last, rounding)
-    if not (is_curved and joint):
+    if not is_curved:
+        return frame
+    columns = slice(joint - 1, joint) if joint else slice(None)
+    measured = None if actual is None else replace(actual, q=None)  # Their limits do not depend on the angles.
+    used = _frame(plan, measured, lambda curves: usage(curves)[:, columns], -100.0, 100.0, buckets, last)
+    frame = replace(frame, violated=used.violated)
+    if not joint:
         return frame
     drawn = plan if plan is not None else actual
-    used = _frame(plan, actual, lambda curves: usage(curves)[:, joint - 1 : joint], -100.0, 100.0, buckets, last)
-    return replace(frame, violated=used.violated, **_limit_curves(drawn, edges, frame))
+    return replace(frame, **_limit_curves(drawn, edges, frame))
 
 
 def build_tool_frame(

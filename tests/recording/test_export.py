@@ -126,7 +126,7 @@ def test_the_page_of_an_arm_whose_velocity_bounds_depend_on_its_angles_has_them_
         np.frombuffer(packed, "<f4", arrays[name]["count"], arrays[name]["at"]).reshape(7, -1)
         for name in ("dq_lowest", "dq_highest")
     )
-    at_angles = fr3.limits.joint.velocity_bounds(RUN.q)
+    at_angles = fr3.limits.joint.velocity_bounds(RUN.q_c)
     assert np.allclose(np.radians(lowest.T), at_angles[0], atol=1e-5)
     assert np.allclose(np.radians(highest.T), at_angles[1], atol=1e-5)
     assert np.ptp(highest[1]) > 10.0

@@ -243,11 +243,11 @@ def test_what_only_allows_for_rounding_is_0_and_the_verdict_counts_conditions_as
     cards = rows_html(report, MODEL, "", Text("en"))
     assert cards.count("rl-card rl-bad") == 1
     card = next(card for card in cards.split('<div class="rl-card') if "Tool inside the safety box" in card)
-    assert " / 0 mm" in card
+    assert re.search(r"\d mm \(must be 0\)", card)
     assert '<span class="rl-share"></span>' in card
     assert "10⁻" not in cards
     rest = next(card for card in cards.split('<div class="rl-card') if "Starts at the arm" in card)
-    assert "0 / 0°" in rest
+    assert "0° (should be 0)" in rest
     assert "%" not in rest.partition("rl-meter")[0]
     headline = CheckPanel(Text("en"), lambda request: None)._headline(bench.plan, None, None, is_current=True)
     assert f"Violated conditions: 1 (occurrences: {len(report.violations)})." in headline

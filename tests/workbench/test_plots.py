@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rcilab.app.goal.goal import goal_at
+from rcilab.app.planning import build_plan_view
+from rcilab.app.run.recording import Recording
+from rcilab.app.store import UiState
+from rcilab.app.text import Text
 from rcilab.conformance.check import check
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.makers.maker import state_rounding_of
@@ -27,6 +34,7 @@ from rcilab.views.plots import (
     streamed_curves,
 )
 from rcilab.workbench.panels.plot_contents import plot_contents
+from rcilab.workbench.panels.plots import Plots
 
 MODEL = load_model("xMatePro7")
 FR3 = load_model("FR3")
@@ -108,6 +116,25 @@ def test_a_velocity_limit_that_depends_on_the_angle_is_a_curve_along_plan_and_ru
     used = build_frame(plan, None, limits, "dq", 0)
     assert set(used.upper) == {100.0}
     assert np.nanmax(used.plan[0]) == 0.0  # A joint at rest uses nothing of its limit.
+
+
+@pytest.mark.parametrize("mode", ["torque", "joint_position"])
+def test_torques_have_a_velocity_limit_that_does_not_depend_on_the_angles(mode):
+    """A torque takes joint 4 of an FR3 faster over the end of its range than it may be commanded there."""
+    limits, t = FR3.limits.joint, CYCLE_TIME * np.arange(300)
+    q, dq = np.tile(near_the_end().goal, (300, 1)), np.zeros((300, 7))
+    dq[:, 3] = 1.0
+    still = Motion.from_cycles(q)
+    plan = build_plan_view(FR3, still, check(still, FR3))
+    state = UiState(model=FR3, goal=goal_at(FR3, q[0]), plan=plan, plot_joint=4)
+    run = replace(state, recording=Recording(t=t, q=q + np.outer(t, dq[0]), q_c=q, dq=dq, delay=0, mode=mode))
+    frame = Plots(Text("en"))._joint_frame(run, "dq", 1.0)
+    expected = limits.velocity[3] if mode == "torque" else limits.velocity_bounds(q[0])[1][3]
+    assert frame.upper == pytest.approx(expected)
+    assert bool(frame.upper[0] > 1.0) is (mode == "torque")
+    assert not frame.violated.any(), "what is measured has the same bound everywhere"
+    planned = Plots(Text("en"))._joint_frame(replace(state, plan=replace(plan, mode=mode)), "dq", 1.0)
+    assert np.array_equal(planned.upper, frame.upper)
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)

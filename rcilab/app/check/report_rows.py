@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rcilab.conformance.explain import explain_place
-from rcilab.i18n.condition_values import value_against_bound
+from rcilab.i18n.condition_values import value_against_bound, with_unit
 
 if TYPE_CHECKING:
     from rcilab.app.goal.goal import Tone
@@ -41,7 +41,12 @@ def row_word(row: ConditionResult, text: Text) -> str:
 
 def row_facts(row: ConditionResult, text: Text) -> list[str]:
     """Returns the worst value, where it is, and when."""
-    facts = [value_against_bound(*row.displayed, row.unit, text)]
+    value, bound = row.displayed
+    if bound:
+        facts = [value_against_bound(value, bound, row.unit, text)]
+    else:
+        (number,) = text.units.format_numbers(row.unit, value)
+        facts = [text(f"check.zero.{row.necessity}", value=with_unit(number, row.unit, text))]
     if row.links is not None:
         facts.append(explain_place(row, text.language))
     elif row.joint:

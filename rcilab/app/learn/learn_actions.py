@@ -165,7 +165,13 @@ def build_display(demo: FaultDemo, plan_motion: object) -> FaultDisplay:
         demo=demo,
         displayed=display_fault(demo),
         recording=Recording(
-            t=np.array(rows["t"]), q=rows["q"], q_c=rows["q_c"], dq=rows["dq"], delay=0, moment=demo.time
+            t=np.array(rows["t"]),
+            q=rows["q"],
+            q_c=rows["q_c"],
+            dq=rows["dq"],
+            delay=0,
+            mode=demo.scenario.mode,
+            moment=demo.time,
         ),
         plan_motion=plan_motion,
     )

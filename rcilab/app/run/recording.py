@@ -29,6 +29,8 @@ class Recording:
     """Measured, [N m], shape (N, n); None if it was not recorded."""
     delay: int
     """Cycles between a command and the state that shows it: the controller's play-out, and its answer."""
+    mode: str = ""
+    """Control mode, such as "torque"; "" during the motion, where it is that of the plan."""
     run: Run | None = None
     """The whole run, once the arm stands still."""
     scaled_motion: SpeedScaledMotion | None = None

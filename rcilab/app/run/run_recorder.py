@@ -144,6 +144,7 @@ def whole_recording(
         dq=run.dq,
         tau=run.tau,
         delay=run.delay,
+        mode=run.setup.mode,
         run=run,
         scaled_motion=scaled_motion,
         tracking=run.tracking,

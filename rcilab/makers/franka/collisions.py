@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from rcilab.i18n.rounding import format_pair
 from rcilab.i18n.translator import Remark
+from rcilab.makers.franka.bounds import DEFAULT_THRESHOLD
 
 _AXES = ("along x", "along y", "along z", "about x", "about y", "about z")
 
@@ -62,10 +63,10 @@ def _describe(
     sign, size = "-" if value < 0.0 else "", abs(value)
     if bound is None:
         sentence = (
-            f"{text} {size:.4g} {unit} is above its threshold, which was not set over this connection "
-            f"({field} is {sign}{size:.4g})"
+            f"{text} {size:.4g} {unit} is above its threshold, which was not set over this connection (a virtual "
+            f"controller starts with {DEFAULT_THRESHOLD:g} {unit}; {field} is {sign}{size:.4g})"
         )
-        return Remark(sentence, f"{code}_unset", value=size, unit=unit, **what)
+        return Remark(sentence, f"{code}_unset", value=size, bound=DEFAULT_THRESHOLD, unit=unit, **what)
     shown, threshold = format_pair(size, bound)
     sentence = f"{text} {shown} {unit} is above its threshold {threshold} {unit} ({field} is {sign}{shown})"
     return Remark(sentence, code, value=size, bound=bound, unit=unit, **what)

@@ -200,8 +200,10 @@ class Plots:
             if name in ("ddq", "jerk"):
                 actual = _commanded_part(actual, state)
         model = plan.model if plan is not None and plan.is_recorded else state.model  # With the limits of its time.
+        mode = (recording.mode if recording is not None else "") or ("" if plan is None else plan.mode)
+        limits = model.limits.joint.in_mode(mode)
         return build_frame(
-            self._planned.get(name), actual, model.limits.joint, name, state.plot_joint, factor=factor, last=self._last
+            self._planned.get(name), actual, limits, name, state.plot_joint, factor=factor, last=self._last
         )
 
     def _tool_frame(self, state: UiState, name: ToolQuantity, factor: float) -> Frame:

@@ -13,6 +13,7 @@ import pytest
 
 from rcilab.app import fault_lab
 from rcilab.app.fault_lab.fault_demo import script
+from rcilab.app.learn.learn_actions import build_display
 from rcilab.core.errors import CommandRejectedError, InvalidValueError, ManualRecoveryError, ModelError, UsageError
 from rcilab.core.fault import FaultCode, find_fault
 from rcilab.makers.franka.errors import FrankaError
@@ -65,6 +66,8 @@ def test_the_errors_of_franka_come_one_at_a_time_with_their_reason_and_the_arm_m
             assert fault.manual_name in demo.explain("en")
             assert demo.describe("sent", "en") != demo.describe("sent", "zh")
             assert demo.way_out[-2:] == ("recover", "move")
+            shown = build_display(demo, None)
+            assert shown.recording.mode == shown.displayed.run.setup.mode == demo.scenario.mode
 
 
 @NO_LIBRARY
