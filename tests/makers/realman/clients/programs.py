@@ -12,7 +12,7 @@ import time
 from typing import Any
 
 _KEPT: list[Any] = []
-"""Callbacks. The library may call one after its push is off and its robot deleted, and crashes if it is gone by then."""
+"""Callbacks. The library may call one after its push is off and its robot deleted, and crashes if it is gone."""
 
 
 def joint_commands(robot: Any, n: int) -> dict[str, Any]:
