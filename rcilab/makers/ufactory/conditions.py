@@ -1,8 +1,10 @@
 """The conditions of UFACTORY controllers: the common rows with the maker's bounds and error codes.
 
-Targets of mode 1 (servo) are checked at the rate at which they are sent; the controller itself plans the motions of the
-other modes within these bounds. The manual publishes ranges, speeds, accelerations and jerks, but not which of its
-errors a target beyond an acceleration or a jerk raises: the remedy of C24 names accelerations, that of C25 the path.
+The rows are those of targets of mode 1 (servo); the controller itself plans the motions of the other modes within the
+same bounds. The manual publishes ranges, speeds, accelerations and jerks. Targets of mode 1 beyond a speed, an
+acceleration or a jerk are no error: the controller follows them later, as fast as it may. Their rows are therefore
+recommended. Errors are a joint out of its range (C23), a pose without joint angles (C21) or a step away (C24), and a
+tool that is too fast (C60).
 
 The interface has no arm angle and takes no torques, so there are no rows on them. A reduced mode sets ranges and
 speeds within these, and a safety boundary is the box of `cartesian.position`.
@@ -18,6 +20,7 @@ from rcilab.conformance.common_conditions import (
     EXTERNAL_TORQUE,
     JOINT_CONDITIONS,
     JOINT_END_CONDITIONS,
+    JOINT_POSITION,
     LINK_DISTANCE,
     MEASURED_CONDITIONS,
     MOTION_TORQUE_CONDITIONS,
@@ -31,12 +34,11 @@ from rcilab.makers.ufactory.bounds import REPORT_PERIOD, SERVO_STEP
 from rcilab.makers.ufactory.errors import UfactoryError
 
 _MANUAL = "user manual of UFACTORY Studio"
-_RATE_ERRORS = (UfactoryError.JOINT_RANGE, UfactoryError.SPEED, UfactoryError.SPEED, UfactoryError.PLANNING)
-"""By order of the derivative."""
+_LATER = f"{_MANUAL}, 9 and 10; the controller follows faster targets later"
 
-_JOINTS = tuple(
-    replace(row, fault=fault, source=f"{_MANUAL}, 10 and 12" + ("" if row.order < 2 else " (code: rcilab)"))
-    for row, fault in zip(JOINT_CONDITIONS, _RATE_ERRORS, strict=True)
+_JOINTS = (
+    replace(JOINT_POSITION, fault=UfactoryError.JOINT_RANGE, source=f"{_MANUAL}, 10 and 12"),
+    *(replace(row, necessity="recommended", source=_LATER) for row in JOINT_CONDITIONS if row is not JOINT_POSITION),
 )
 _TORQUE = replace(MOTION_TORQUE_CONDITIONS[0], source="maker's description package, effort (gravity excepted)")
 _ENDS = tuple(
@@ -44,17 +46,14 @@ _ENDS = tuple(
     for row in JOINT_END_CONDITIONS
 )
 _TOOL_RATES = tuple(
-    replace(
-        row,
-        fault=_RATE_ERRORS[row.order],
-        source=f"{_MANUAL}, 10 and 12 (norm: rcilab)" if row.signal == "translation" else "bound: see the arm's limits",
-    )
+    replace(row, necessity="recommended", source=f"{_LATER} (norm: rcilab)")
     for row in TOOL_CONDITIONS
     if row.signal in ("translation", "rotation")
 )
 _SERVO_SPEED = replace(
     _TOOL_RATES[0],
     id="servo.velocity.translation",
+    necessity="necessary",
     fault=UfactoryError.SERVO_LINEAR_SPEED,
     source="client library, table of codes, 60, and default of set_linear_spd_limit_factor",
     bounds=lambda limits: symmetric_bounds(all_limits(limits).joint_tool_velocity),

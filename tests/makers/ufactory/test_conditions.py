@@ -23,13 +23,13 @@ AHEAD = ARM.home + [0.0, 0.9, -0.9, 0.0, 0.0, 0.0]
 GOAL = ARM.home + [0.6, 0.2, -0.3, 0.4, 0.2, -0.5]
 
 
-def spoiled(order, size):
-    """A motion of joint 1 from home that exceeds a bound of the given derivative, in its second half."""
+def spoiled(joint, order, size):
+    """A motion of a joint, counted from 0, that exceeds a bound of the given derivative, in its second half."""
     rate = np.zeros(2000)
     rate[1000 : 1000 + (1 if order > 1 else 900)] = size
     for _ in range(order):
         rate = np.cumsum(rate) * CYCLE_TIME
-    return Motion.from_cycles(AHEAD + np.outer(rate, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    return Motion.from_cycles(AHEAD + np.outer(rate, np.eye(6)[joint]))
 
 
 def test_every_arm_is_checked_by_the_table_and_ids_are_unique():
@@ -73,17 +73,20 @@ def test_planned_motions_conform(name):
 
 
 @pytest.mark.parametrize(
-    ("motion", "ids", "code"),
-    [
-        (spoiled(1, 3.5), "joint.velocity", 24),
-        (spoiled(1, 3.1), "servo.velocity.translation", 60),
-        (spoiled(2, 25.0), "joint.acceleration", 24),
-        (spoiled(3, 600.0), "joint.jerk", 25),
-    ],
+    ("order", "size", "row"), [(1, 3.5, "joint.velocity"), (2, 25.0, "joint.acceleration"), (3, 600.0, "joint.jerk")]
 )
-def test_a_target_beyond_a_bound_has_the_code_of_the_client_library(motion, ids, code):
-    found = {v.condition.id: v.condition.fault for v in check(motion, ARM, distance=None).violations}
-    assert found[ids] == UfactoryError(code)
+def test_targets_that_are_too_fast_for_a_joint_are_a_warning_and_no_error(order, size, row):
+    report = check(spoiled(5, order, size), ARM, distance=None)
+    assert report.ok
+    (warning,) = (v for v in report.warnings if v.condition.id == row)
+    assert (warning.joint, warning.fault) == (6, None)
+    assert "the controller does not stop for it" in str(warning)
+
+
+def test_a_tool_that_is_too_fast_has_code_60():
+    assert {v.fault for v in check(spoiled(0, 1, 3.1), ARM, distance=None).violations} == {
+        UfactoryError.SERVO_LINEAR_SPEED
+    }
 
 
 def test_a_motion_out_of_range_and_one_out_of_the_boundary_have_codes_23_and_35():
@@ -100,7 +103,7 @@ def test_a_motion_out_of_range_and_one_out_of_the_boundary_have_codes_23_and_35(
 
 def test_each_code_that_a_condition_can_raise_has_a_row():
     codes = {row.fault.value for row in TABLE.conditions if row.fault is not None}
-    assert codes == {21, 22, 23, 24, 25, 30, 31, 35, 60}
+    assert codes == {21, 22, 23, 24, 30, 31, 35, 60}
 
 
 def test_errors_and_warnings_are_named_and_explained():

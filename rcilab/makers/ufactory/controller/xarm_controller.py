@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rcilab.conformance.common_conditions import JOINT_VELOCITY
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.errors import UsageError
 from rcilab.core.fault import FaultCode
@@ -88,6 +89,8 @@ _PRESSED: dict[SafetyButton, str] = {
     "gstop": "the input of the emergency stop was opened",
     "switch": "the three-position switch was let go or pressed through",
 }
+_PLANNED = {JOINT_VELOCITY.id: UfactoryError.SPEED}
+"""Of the joints along a line that the controller plans; targets of mode 1 are followed later instead."""
 _REFUSALS = {
     RefusalReason.JOINT_RANGE: UfactoryError.JOINT_RANGE,
     RefusalReason.GEOMETRY: UfactoryError.PLANNING,
@@ -152,7 +155,7 @@ class XArmController:
         self.on_state: Callable[[State, State], None] = lambda before, after: None
         conditions = arm.model.description.conditions
         assert conditions is not None  # Every arm of this maker has them.
-        self._faults = {row.id: row.fault for row in reversed(conditions().conditions)}
+        self._faults = {row.id: row.fault for row in reversed(conditions().conditions)} | _PLANNED
         self._set_state = State.STOPPED
         self._shown_state = State.STOPPED
         self._is_outdated = False  # Settings have changed that the arm has not yet.
