@@ -1,4 +1,7 @@
-"""The bits and registers that standard Modbus reads and writes: the table of the maker's Modbus manual."""
+"""The bits and registers that standard Modbus reads and writes: the table of the maker's Modbus manual.
+
+What is reserved there, or does not exist on this arm, reads 0. A write that nothing would keep is refused.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +18,24 @@ from rcilab.makers.ufactory.wire.modbus import ModbusError, ModbusException
 from rcilab.makers.ufactory.wire.poses import pose_as_mm_rpy, rotation_vector
 
 _BOX_BITS, _RESERVED_BITS = 32, 128  # Addresses of the box, then of the tool; from 128 on the state.
-_ENABLES, _REDUCED, _FENCE, _PAUSED, _STOPPED, _MODES, _FREE = 135, 142, 143, 144, 145, 146, 256
+_BRAKES, _ENABLES, _REDUCED, _FENCE, _PAUSED, _STOPPED, _MODES, _FREE = 128, 135, 142, 143, 144, 145, 146, 256
 _END = 512
 _MODE, _STATE = 32, 33
 _ANALOG = 3
+_JOINTS, _MODE_BITS = 7, 14  # Bits of brakes and of motors, and of modes.
+_TOOL_BITS, _TOOL_OUTPUTS = 8, 2
+_ANY = 0xFFFF
+_LARGEST = {
+    0: _ANY,
+    1: 0,
+    2: 0b11,
+    _ANALOG: _ANY,
+    _ANALOG + 1: _ANY,
+    **dict.fromkeys(range(5, 11), 0),
+    _MODE: _ANY,
+    _STATE: _ANY,
+}
+"""Largest value of a holding register below `_FREE` that can be written: an output that does not exist stays 0."""
 
 
 class ModbusRegisters:
@@ -37,11 +54,11 @@ class ModbusRegisters:
         """Returns outputs, brakes, motors, reduced mode, fence, states and modes, and free bits."""
         controller = self._controller
         bits = _signal_bits(controller.signals.box_outputs, controller.signals.tool_outputs)
-        enabled = [bool(controller.enabled >> k & 1) for k in range(7)]
+        enabled = [bool(controller.enabled >> k & 1) for k in range(_JOINTS)]
         state = controller.shown_state
         bits += [*enabled, *enabled, controller.settings.reduced, controller.settings.fence]
         bits += [state is State.PAUSED, state is State.STOPPED]
-        bits += [mode == controller.mode for mode in range(14)]
+        bits += [mode == controller.mode for mode in range(_MODE_BITS)]
         bits += [False] * (_FREE - len(bits))
         return _part([*bits, *self._free_bits], address, count)
 
@@ -80,21 +97,24 @@ class ModbusRegisters:
         return [value & 0xFFFF for value in _part(values, address, count)]
 
     def write_coils(self, address: int, bits: Sequence[bool]) -> None:
-        """Writes outputs, motors, reduced mode, fence, pause, stop, the mode, and free bits; others are ignored."""
-        _part(range(_END), address, len(bits))
+        """Writes outputs, brakes and motors, reduced mode, fence, pause, stop, the mode, and free bits; all or none."""
+        if not all(self._keeps_coil(number, bit) for number, bit in enumerate(bits, address)):
+            raise ModbusError(ModbusException.ADDRESS)
         for number, bit in enumerate(bits, address):
             self._write_coil(number, bit)
 
     def write_holding(self, address: int, registers: Sequence[int]) -> None:
-        """Writes outputs, mode, state, and free registers; others are ignored."""
-        _part(range(_END), address, len(registers))
+        """Writes outputs, mode, state, and free registers; all or none."""
+        for number, value in enumerate(registers, address):
+            if not (value <= _LARGEST.get(number, -1) or _FREE <= number < _END):
+                raise ModbusError(ModbusException.ADDRESS)
         signals = self._controller.signals
         for number, value in enumerate(registers, address):
             if number == 0:
                 for signal in range(BOX_SIGNALS):
                     signals.set_output(signal, bool(value >> signal & 1))
             elif number == 2:
-                for signal in range(2):
+                for signal in range(_TOOL_OUTPUTS):
                     signals.set_output(BOX_SIGNALS + signal, bool(value >> signal & 1))
             elif number in (_ANALOG, _ANALOG + 1):
                 signals.set_analog(number - _ANALOG, round(1e-3 * value / BOX_VOLTAGE * HIGHEST_CODE))
@@ -105,14 +125,22 @@ class ModbusRegisters:
             elif number >= _FREE:
                 self._free_registers[number - _FREE] = value
 
+    def _keeps_coil(self, number: int, bit: bool) -> bool:
+        """Returns whether a bit can be written; that of an output or a joint that does not exist stays 0."""
+        if number < _BOX_BITS + _TOOL_BITS:
+            return not bit or number < BOX_SIGNALS or _BOX_BITS <= number < _BOX_BITS + _TOOL_OUTPUTS
+        if _BRAKES <= number < _REDUCED:
+            return not bit or (number - _BRAKES) % _JOINTS < self._controller.model.n
+        return _REDUCED <= number < _MODES + _MODE_BITS or _FREE <= number < _END
+
     def _write_coil(self, number: int, bit: bool) -> None:
         controller = self._controller
         if number < BOX_SIGNALS:
             controller.signals.set_output(number, bit)
-        elif _BOX_BITS <= number < _BOX_BITS + 2:
+        elif _BOX_BITS <= number < _BOX_BITS + _TOOL_OUTPUTS:
             controller.signals.set_output(BOX_SIGNALS + number - _BOX_BITS, bit)
-        elif _ENABLES <= number < _ENABLES + controller.model.n:
-            controller.enable(number - _ENABLES + 1, bit)
+        elif _BRAKES <= number < _REDUCED:  # A brake is released while its motor is on.
+            controller.enable((number - _BRAKES) % _JOINTS + 1, bit)
         elif number in (_REDUCED, _FENCE):
             name = "reduced" if number == _REDUCED else "fence"
             controller.configure(replace(controller.settings, **{name: bit}))
@@ -120,7 +148,7 @@ class ModbusRegisters:
             controller.set_state(SET_PAUSED if bit else SET_READY)
         elif number == _STOPPED:
             controller.set_state(SET_STOPPED if bit else SET_READY)
-        elif _MODES <= number < _MODES + 14 and bit:
+        elif _MODES <= number < _MODES + _MODE_BITS and bit:
             _require(controller.set_mode(number - _MODES))
         elif number >= _FREE:
             self._free_bits[number - _FREE] = bit

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from math import hypot, inf, isinf, radians, tau
 from typing import Any, NamedTuple
@@ -11,7 +12,8 @@ import numpy as np
 
 from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.core.spatial import Pose, rotation_between
-from rcilab.makers.ufactory.bounds import SERVO_STEP, TOOL_ROTATION
+from rcilab.i18n.translator import Remark
+from rcilab.makers.ufactory.bounds import SERVO_PERIOD, SERVO_STEP, TOOL_ROTATION
 from rcilab.makers.ufactory.controller.modes import Answer, Command
 from rcilab.makers.ufactory.controller.queue_end import absolute_pose, relative_pose, tool_pose
 from rcilab.makers.ufactory.controller.xarm_controller import XArmController
@@ -27,6 +29,7 @@ from rcilab.sim.planner import (
     PauseTarget,
     Planner,
     Refusal,
+    RefusalReason,
     Target,
     ToolSpeed,
 )
@@ -219,11 +222,27 @@ def _servo(
         controller.end.begin(q)
     else:
         pose = _servo_pose(controller, function, values)
-        controller.follow(
-            task, partial(Planner.servo_tool, pose=pose, mode="linear", tool_speed=speed, max_step=SERVO_STEP)
-        )
+        controller.follow(task, lambda planner: _servo_tool(controller, planner, pose, speed))
         controller.end.move(pose)
     return Outcome(answer)
+
+
+def _servo_tool(controller: XArmController, planner: Planner, pose: Pose, speed: float) -> Refusal | None:
+    """Follows a streamed pose; the refusal of one too far away also says how fast a joint would have to move."""
+    refusal = planner.servo_tool(pose, mode="linear", tool_speed=speed, max_step=SERVO_STEP)
+    if refusal is None or refusal.reason is not RefusalReason.STEP:
+        return refusal
+    near = planner.q if planner.streamed is None else planner.streamed
+    try:
+        goal = controller.end.solver.nearest(pose, near)
+    except KinematicsError:
+        return refusal
+    dq = np.subtract(goal, near) / SERVO_PERIOD
+    joint = int((np.abs(dq) / controller.model.limits.joint.velocity).argmax()) + 1
+    value, milliseconds = float(dq[joint - 1]), round(1e3 * SERVO_PERIOD)
+    text = f"joint {joint} would move with {value:.4g} rad/s to be there {milliseconds} ms later"
+    needed = Remark(text, "step_speed", joint=joint, value=value, unit="rad/s", milliseconds=milliseconds)
+    return replace(refusal, remark=Remark.all((refusal.remark, needed)))
 
 
 def _servo_pose(controller: XArmController, function: Function, values: tuple[Any, ...]) -> Pose:

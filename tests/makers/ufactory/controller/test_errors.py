@@ -42,6 +42,13 @@ def over_the_base(arm: Arm) -> None:
     arm.move_line((-x, -y, z, roll, pitch, yaw))
 
 
+def to_another_branch_on_line(arm: Arm) -> None:
+    """The end has joint angles, but with joint 5 on its other side."""
+    arm.ready(Mode.CARTESIAN_ONLINE)
+    _, pose = arm.call(Function.GET_FK, "7f", 0.904, -0.806, 0.064, -0.78, -0.42, -1.953, 0.0)
+    arm.move_line(struct.unpack("<6f", pose))
+
+
 def out_of_reach(arm: Arm) -> None:
     arm.move_line((1500.0, 0.0, 300.0, 3.1, 0.0, 0.0))
 
@@ -105,6 +112,7 @@ CAUSES: list[tuple[int, Callable[[Arm], None]]] = [
     (25, points_on_a_line),
     (35, leave_the_boundary),
     (40, over_the_base),
+    (40, to_another_branch_on_line),
     (60, fast_servo_targets),
 ]
 

@@ -7,6 +7,7 @@ import struct
 import numpy as np
 import pytest
 
+from rcilab.makers.ufactory.bounds import SERVO_PERIOD
 from rcilab.makers.ufactory.controller.modes import Mode
 from rcilab.makers.ufactory.wire.functions import Function
 from tests.makers.ufactory.controller.conftest import Q6, Arm
@@ -49,3 +50,17 @@ def test_the_last_errors_have_joint_and_value(arm: Arm) -> None:
     assert bound == pytest.approx(50.0)
     assert 50.0 < speed < 100.0
     assert information(arm, 104, "Bf") == (0, 0.0)
+
+
+def test_a_pose_a_step_away_has_the_joint_that_would_be_too_fast(arm: Arm) -> None:
+    arm.ready(Mode.SERVO)
+    x, y, *others = arm.pose
+    pose = (x, y + 12.0, *others)
+    goal = struct.unpack("<7f", arm.call(Function.GET_IK, "6f", *pose)[1])[:6]
+    dq = np.subtract(goal, arm.q) / SERVO_PERIOD
+    arm.call(Function.SERVO_CARTESIAN, "9f", *pose, 0.0, 0.0, 0.0)
+    assert arm.error[0] == 24
+    joint, speed = information(arm, 104, "Bf")
+    assert joint == np.abs(dq).argmax() + 1
+    assert speed == pytest.approx(dq[joint - 1], rel=1e-3)
+    assert abs(speed) > np.pi

@@ -389,6 +389,35 @@ def test_standard_modbus_reads_and_writes_the_arm(arm: Arm) -> None:
     assert modbus(arm, "01 01ff 0002") == "81 02"
 
 
+@pytest.mark.parametrize(
+    "write",
+    [
+        "06 000a 0001",  # An analog output of the tool, which has none.
+        "06 000b 0000",  # Reserved.
+        "06 0030 0001",  # An offline task.
+        "06 0002 0004",  # The third digital output of the tool.
+        "10 0000 0002 04 0001 0001",  # Digital outputs of the box, beyond the 16th too.
+        "10 0200 0001 02 0001",
+        "05 0010 ff00",  # Its 17th output.
+        "05 0028 0000",  # Reserved.
+        "05 0086 ff00",  # The brake of joint 7.
+        "0f 000f 0002 01 03",
+    ],
+)
+def test_standard_modbus_refuses_to_write_what_would_not_be_kept(arm: Arm, write: str) -> None:
+    assert modbus(arm, write) == f"{int(write[:2], 16) | 0x80:02x} 02"
+    assert arm.controller.signals.outputs == 0
+    assert modbus(arm, "03 0000 0022").startswith("03 44 ")
+    assert modbus(arm, "10 0000 0002 04 0001 0000") == "10 00 00 00 02"
+
+
+def test_the_bit_of_a_brake_switches_its_motor(arm: Arm) -> None:
+    for bit, enabled in (("0000", 0x3D), ("ff00", 0x3F)):
+        modbus(arm, f"05 0081 {bit}")
+        assert arm.controller.enabled == enabled
+        assert modbus(arm, "01 0080 000e") == f"01 02 {(enabled | enabled << 7) & 0xFF:02x} {enabled >> 1:02x}"
+
+
 def test_a_heartbeat_has_no_answer(arm: Arm) -> None:
     before = len(arm.link.sent[arm.client])
     arm.server.receive(arm.client, bytes.fromhex("0000 0001 0002 0000"))
