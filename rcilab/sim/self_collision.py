@@ -43,7 +43,7 @@ class SelfCollisionWatch:
         self._q, self._reserve = q, 0.0
 
     def step(self, q: JointVector) -> Remark | None:
-        """Returns which links touch, or are closer than at the start if they touched there, or None.
+        """Returns which links touch, or are closer than at the start while they still touch from there, or None.
 
         Args:
             q: Measured joint angles, shape (7,), [rad].
@@ -51,5 +51,7 @@ class SelfCollisionWatch:
         if self._levers.dot(np.abs(q - self._q)) < self._reserve:  # No point of the arm has moved farther.
             return None
         distance, links = self._query.links(q)
+        if distance > 0.0:  # They have moved apart.
+            self._smallest = 0.0
         self._q, self._reserve = q, distance - self._smallest
         return Remark(f"{links} touch", "links_touch") if distance < self._smallest else None
