@@ -167,6 +167,7 @@ class StreamMover:
         self._tool: StreamSpeed | None = None
         self.target = list(state.q)
         self._line_velocity = [0.0] * len(state.q)
+        self._is_on_line = False
         self._is_off = False  # Whether it approaches the angles to follow.
         self._before = list(state.q)  # What was to be followed in the cycle before.
         self._past: list[list[float]] = []  # The last angles, the newest first, while they are smoothed.
@@ -225,7 +226,10 @@ class StreamMover:
         if self._filter.mode == "linear":
             before = self.state
             dq = self._filter.velocity
-            if not self._stays_on_line(q, dq):
+            was_on_line, self._is_on_line = self._is_on_line, self._stays_on_line(q, dq)
+            if not self._is_on_line:
+                if was_on_line:  # Where a line ends, the joints brake; they would turn back before that jerk is undone.
+                    self._axes.set_state(before.q, before.dq, [0.0] * len(q))
                 self._step_along(
                     q, [min(max(v, -top), top) for v, top in zip(dq, self._velocity, strict=True)], self._velocity
                 )

@@ -92,3 +92,26 @@ def test_a_joint_is_not_faster_than_180_degrees_per_second_whatever_is_sent(arm:
         assert arm.controller.error is None
         fastest = max(fastest, abs(arm.controller.arm.commanded.dq[5]))
     assert fastest == pytest.approx(np.pi, rel=1e-3)
+
+
+@pytest.mark.parametrize("seed", [6, 12, 19])
+def test_targets_that_come_late_hardly_turn_a_joint_back(seed: int) -> None:
+    arm = Arm()
+    goal = arm.controller.model.home
+    start = goal + [0.0, 0.297, 1.13, 0.0, -0.057, -0.02]
+    rows = plan_joint(arm.controller.model, start, goal, speed=0.2).q
+    arm.controller.set_up(ArmSetup(q=tuple(goal)))
+    arm.call(Function.SET_SELF_COLLISION, "B", 0)
+    arm.ready()
+    arm.move_joints(start)
+    arm.run()
+    arm.ready(Mode.SERVO)
+    rng, due, farthest = np.random.default_rng(seed), 0, start[2]
+    for cycle in range(250):
+        if cycle >= due:
+            arm.call(Function.SERVO_JOINT, "10f", *rows[cycle], *NOTHING)
+            due = cycle + int(rng.choice((5, 6, 7, 10, 15, 20, 25)))
+        arm.step()
+        farthest = min(farthest, arm.q[2])
+        assert arm.q[2] - farthest < 5e-4  # [rad]
+    assert arm.controller.error is None
