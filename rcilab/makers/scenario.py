@@ -108,7 +108,7 @@ class FaultScenario:
     act: Callable[[Scene], Callback] | None = None
     """Returns the callback that provokes the fault; None: a request does."""
     request: Callable[[Scene], tuple[FaultCode, ...]] | None = None
-    """Sends a request that the controller refuses, and returns the errors that it then reports; None: `act` does it."""
+    """Sends requests that lead to an error, and returns the errors that are then reported; None: `act` does it."""
     prepare: Callable[[Scene], Scene] = field(default=_as_it_is)
     """Prepares the scene: narrows a limit, softens the arm. The arm does not move."""
     restore: Callable[[Scene], None] = field(default=_nothing)

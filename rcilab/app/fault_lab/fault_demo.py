@@ -49,7 +49,7 @@ class FaultDemo:
     after: NDArray[np.void]
     """Recorded cycles after the fault, in which the controller stops the arm; they contain no commands."""
     signal: FaultSignal | None
-    """The quantity that violated its condition, cycle by cycle; None of a refused request, which violates none."""
+    """The quantity that violated its condition, cycle by cycle; None of a request."""
     way_out: tuple[RecoveryStep, ...]
     """The steps of the recovery, in this order; afterwards the arm moved again."""
 

@@ -158,7 +158,7 @@ class FaultLab(Closeable):
         scene: Scene,
         progress: Tell,
     ) -> FaultDemo:
-        """Sends a request that is refused, to an arm at standstill, and records the cycles around it."""
+        """Sends the requests that lead to an error, to an arm at standstill, and records the cycles around them."""
         log, begun = CycleLog(Recorder(self.model.n, _CAPACITY)), robot.receive_state().message_id
         _watch_standstill(robot, log, begun)
         sent = len(log.recorder.rows())

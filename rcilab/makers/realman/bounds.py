@@ -24,7 +24,8 @@ ANGULAR_ACCELERATION: Final = 4.0  # [rad/s^2]
 LARGEST_STREAM_STEP: Final = 10.0
 """Largest distance of a joint from one streamed command to the next, [deg]; the maker's page on movej_canfd."""
 SPEED_ALLOWANCE: Final = 1.15
-"""Factor on the largest speed of a joint, beyond which it is too fast; rcilab's own.
+"""Factor on the largest speed of a joint, beyond which it is too fast, and on speeds and accelerations of the tool in a
+stream; rcilab's own.
 
 Streamed angles that arrive irregularly are followed up to a tenth faster."""
 LONGEST_TOOL: Final = 1.0  # [m] Distance of a tool frame, or of a centre of mass, from the flange; rcilab's own bound.

@@ -141,7 +141,7 @@ _CAUSES = {
     RealManError.JOINT_OVERSPEED: "a joint is commanded to move faster than allowed",
     RealManError.TOOL_BOARD: "the board at the end of the arm cannot be reached",
     RealManError.OVERSPEED: "the tool is commanded to move faster than allowed",
-    RealManError.OVERACCELERATION: "a joint is commanded to accelerate faster than allowed",
+    RealManError.OVERACCELERATION: "tool or joints are commanded to accelerate more than allowed",
     RealManError.BRAKE: "the brake of a joint did not open",
     RealManError.DRAG_OVERSPEED: "the arm was guided too fast",
     RealManError.COLLISION: "the arm collided",

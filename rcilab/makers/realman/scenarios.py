@@ -1,14 +1,13 @@
 """The errors of RealMan's controllers that a session can provoke, each by the shortest stream or request.
 
-A request that is refused is sent by the maker's client library to an arm that stands still.
+A request that is refused, and a stream of poses, are sent by the maker's client library to an arm that stands still.
 
-The controller follows a stream with the largest accelerations of its joints, and does not watch the speed of the tool,
-so that 0x1009 and 0x100A have no scenario. The other errors are failures of hardware: of a drive, a brake, a bus, a
-board, a sensor, a power supply.
+The other errors are failures of hardware: of a drive, a brake, a bus, a board, a sensor, a power supply.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -20,7 +19,7 @@ from rcilab.core.fault import FaultCode
 from rcilab.makers.realman.bounds import LARGEST_STREAM_STEP, MOST_SENSITIVE, SPEED_ALLOWANCE
 from rcilab.makers.realman.errors import RealManError, errors_of_codes
 from rcilab.makers.realman.wire.units import pose_for_client
-from rcilab.makers.scenario import Callback, FaultScenario, Group, Scene
+from rcilab.makers.scenario import Callback, FaultScenario, Scene
 from rcilab.makers.scenario_streams import (
     PAUSE,
     joint_stream,
@@ -41,6 +40,12 @@ _PUSH = 60.0  # [N]
 _UNREACHABLE = 3.0  # [m] Length that no arm has.
 _PERCENT = 10  # Speed of motions, which do not begin.
 _DISABLED = 3  # The joint, from 1.
+_TOOL_SPEED, _TOOL_ACCELERATION = 0.05, 0.2  # [m/s], [m/s^2] Largest ones that the tool gets, each for its own error.
+_ANY_SPEED, _ANY_ACCELERATION = 10.0, 100.0  # [m/s], [m/s^2]; [rad/s], [rad/s^2].
+_TWICE = 2.0  # Of the largest speed or acceleration, in a stream of poses.
+_SMOOTH = 0.5  # [m/s^2] With which such a stream becomes fast.
+_POSES, _POSE_PERIOD = 100, 0.005  # Of such a stream, and [s] from one to the next.
+_FITTED = 1  # Trajectory mode: on a curve.
 _READS = 200  # Of the errors, until a request has its effect.
 _BOX, _INSIDE, _WHOLE_ARM = 1, 0, 0  # Form, side and region of a fence.
 _FOLDED_DEG = {
@@ -145,6 +150,35 @@ def _move_a_disabled_joint(scene: Scene) -> tuple[FaultCode, ...]:
     return _errors(scene)
 
 
+def _tool_slowed(scene: Scene) -> Scene:
+    scene.commands.set_tool_limits(_TOOL_SPEED, _ANY_ACCELERATION, _ANY_SPEED, _ANY_ACCELERATION)
+    return scene
+
+
+def _tool_softened(scene: Scene) -> Scene:
+    scene.commands.set_tool_limits(_ANY_SPEED, _TOOL_ACCELERATION, _ANY_SPEED, _ANY_ACCELERATION)
+    return scene
+
+
+def _hurry_down(scene: Scene) -> tuple[FaultCode, ...]:
+    return _stream_down(scene, _TWICE * _TOOL_SPEED, _SMOOTH)
+
+
+def _rush_down(scene: Scene) -> tuple[FaultCode, ...]:
+    return _stream_down(scene, _ANY_SPEED, _TWICE * _TOOL_ACCELERATION)
+
+
+def _stream_down(scene: Scene, speed: float, acceleration: float) -> tuple[FaultCode, ...]:
+    """Streams poses below the start, with a constant acceleration up to a speed."""
+    start, begin = pose_for_client(scene.start.T_base_tool_c), time.monotonic()
+    for t in _POSE_PERIOD * np.arange(_POSES):
+        time.sleep(max(0.0, begin + t - time.monotonic()))
+        ramp = min(t, speed / acceleration)
+        below = acceleration * ramp * (t - 0.5 * ramp)
+        scene.commands.api.rm_movep_canfd([*start[:2], start[2] - below, *start[3:]], True, _FITTED, 0)
+    return _errors(scene)
+
+
 def _errors(scene: Scene) -> tuple[FaultCode, ...]:
     """Returns the errors of the system, as soon as there are some."""
     for _ in range(_READS):
@@ -154,10 +188,8 @@ def _errors(scene: Scene) -> tuple[FaultCode, ...]:
     return ()
 
 
-def _refused(
-    fault: RealManError, request: Callable[[Scene], tuple[FaultCode, ...]], group: Group = "command"
-) -> FaultScenario:
-    return FaultScenario(fault=fault, group=group, mode="joint_position", request=request)
+def _refused(fault: RealManError, request: Callable[[Scene], tuple[FaultCode, ...]]) -> FaultScenario:
+    return FaultScenario(fault=fault, group="command", mode="joint_position", request=request)
 
 
 _SCENARIOS = (
@@ -176,6 +208,14 @@ _SCENARIOS = (
     ),
     FaultScenario(
         fault=RealManError.JOINT_POSITION_STEP, group="velocity", mode="joint_position", act=_jump, is_commanded=True
+    ),
+    FaultScenario(
+        fault=RealManError.OVERSPEED, group="velocity", mode="joint_position", prepare=_tool_slowed,
+        request=_hurry_down,
+    ),
+    FaultScenario(
+        fault=RealManError.OVERACCELERATION, group="acceleration", mode="joint_position", prepare=_tool_softened,
+        request=_rush_down,
     ),
     _refused(RealManError.UNREACHABLE, _reach_too_far),
     _refused(RealManError.CIRCLE, _draw_a_line),

@@ -169,7 +169,7 @@ class StreamMover:
         self._line_velocity = [0.0] * len(state.q)
         self._is_on_line = False
         self._is_off = False  # Whether it approaches the angles to follow.
-        self._before = list(state.q)  # What was to be followed in the cycle before.
+        self._before = list(state.q)  # What was to be followed in the last cycle.
         self._past: list[list[float]] = []  # The last angles, the newest first, while they are smoothed.
         self._is_stationary: bool | None = None  # None: not known yet. Asked for many times a cycle.
 
@@ -177,6 +177,11 @@ class StreamMover:
     def state(self) -> MotionState:
         """Where the joints are and how they move."""
         return _state_of(self._axes)
+
+    @property
+    def curve(self) -> list[float]:
+        """The smoothed angles of this cycle, which the joints follow, n plain floats, [rad]."""
+        return list(self._before)
 
     @property
     def is_stationary(self) -> bool:

@@ -14,7 +14,15 @@ from rcilab.model.robot_model import load_model
 
 pytest.importorskip("Robotic_Arm", reason="needs the extra realman")
 
-WITHOUT_MOTION = ("UNREACHABLE", "CIRCLE", "NO_WORK_FRAME", "NO_TOOL_FRAME", "JOINT_DISABLED")
+REQUESTED = (
+    "OVERSPEED",
+    "OVERACCELERATION",
+    "UNREACHABLE",
+    "CIRCLE",
+    "NO_WORK_FRAME",
+    "NO_TOOL_FRAME",
+    "JOINT_DISABLED",
+)
 STREAMED = (
     "TARGET_OVER_LIMIT", "SELF_COLLISION", "FENCE", "JOINT_OVERSPEED", "JOINT_POSITION_STEP", "COLLISION"
 )  # fmt: skip
@@ -27,14 +35,14 @@ ALIKE = ("CIRCLE", "NO_WORK_FRAME", "NO_TOOL_FRAME", "JOINT_DISABLED")
 @pytest.mark.parametrize("arm", ["RM65", "RM75"])
 def test_errors_come_with_their_reason_and_the_arm_moves_again(arm):
     with FaultLab(arm) as lab:
-        assert {fault.name for fault in lab.faults} == {*STREAMED, *WITHOUT_MOTION}
+        assert {fault.name for fault in lab.faults} == {*STREAMED, *REQUESTED}
         for fault in (fault for fault in lab.faults if arm == "RM65" or fault.name not in ALIKE):
             demo = lab.provoke(fault)
             assert demo.reported == (fault,)
             assert demo.way_out[-2:] == ("recover", "move")
             assert demo.describe("sent", "en") != demo.describe("sent", "zh")
             assert np.isfinite(demo.moved.q).all()
-            if fault.name in WITHOUT_MOTION:
+            if fault.name in REQUESTED:
                 assert demo.signal is None
             else:
                 assert demo.condition is not None

@@ -11,9 +11,11 @@ from math import radians
 
 import numpy as np
 
+from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.limits import Limits
 from rcilab.makers.realman.bounds import ANGLE_STEP, SPEED_ALLOWANCE
+from rcilab.makers.realman.controller.tool_watch import ToolWatch
 from rcilab.motion.bounds import range_from
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arm_command import ArmCommand
@@ -34,6 +36,7 @@ class ArmDrive:
         arm: The arm.
         planner: The planner.
         events: Those of the planner in the last step.
+        watches_tool: Whether streamed angles are those of poses along a curve, so that the tool's speed is observed.
 
     Args:
         arm: The arm after power-up.
@@ -51,6 +54,8 @@ class ArmDrive:
         self._only_shown: list[float] | None = None  # Joint angles of a simulated arm.
         self.planner = Planner(arm.model, limits, arm.commanded.q)
         self.events: tuple[PlannerEvent, ...] = ()
+        self.watches_tool = False
+        self._tool: ToolWatch | None = None
 
     @property
     def q(self) -> JointVector:
@@ -132,6 +137,9 @@ class ArmDrive:
             self._begin()
         self._number += 1
         result = arm.step(ArmCommand(self._number, tuple((np.array(q) + self._zero).tolist())))
+        too_fast = self._check_tool()
+        if too_fast:
+            result = StepResult(measured_violations=(*result.measured_violations, *too_fast))
         if result.command_violations or result.measured_violations:
             self.abort()
             self.events += planner.take_events()
@@ -139,6 +147,17 @@ class ArmDrive:
         if self._idle_cycles > _LINGER:
             arm.discard_motion()
         return result
+
+    def _check_tool(self) -> tuple[LimitViolation, ...]:
+        """Returns which bounds the tool exceeds along the curve of streamed poses."""
+        curve = self.planner.stream_curve if self.watches_tool else None
+        if curve is None:
+            self._tool = None
+            return ()
+        q = np.array(curve) + self._zero
+        if self._tool is None:
+            self._tool = ToolWatch(self.arm.model, self._limits.cartesian, q)
+        return self._tool.step(q)
 
     def _begin(self) -> None:
         arm = self.arm

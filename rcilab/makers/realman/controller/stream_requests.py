@@ -38,6 +38,7 @@ def _joints(controller: RealManController, request: Request) -> None:
     mode, smoothing = _read_smoothing(request)
     refusal = controller.drive.planner.follow_joints(q, mode=mode, smoothing=smoothing)
     _follow(controller, "joint", refusal)
+    controller.drive.watches_tool = False
 
 
 def _follow_joints(controller: RealManController, request: Request) -> None:
@@ -51,6 +52,7 @@ def _pose(controller: RealManController, request: Request) -> None:
     controller.begin_command()
     mode, smoothing = _read_smoothing(request)
     _follow(controller, "pose", controller.drive.planner.follow_tool(pose, mode=mode, smoothing=smoothing))
+    controller.drive.watches_tool = mode != "direct"
 
 
 def _follow_pose(controller: RealManController, request: Request) -> None:
