@@ -214,7 +214,7 @@ class ClientMotions:
         skipped = 0
         if len(cycles) or end is not None:
             skipped = sum(len(range(max(gap.start, self._row), min(gap.stop, row or gap.stop))) for gap in self._gaps)
-            self._gaps = []
+            self._gaps = [range(max(gap.start, row), gap.stop) for gap in self._gaps if row and gap.stop > row]
         length = 0 if row is None else row - self._row
         end = end and replace(end, unrecorded=end.unrecorded + self._cut)
         return MotionPart(motion=self._motion, cycles=cycles, next=self._first, length=length, end=end, skipped=skipped)

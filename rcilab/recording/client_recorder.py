@@ -79,10 +79,9 @@ class ClientRecorder:
                     self._finish(stopped=_CUT)
             if part.end is not None:
                 if self._part == 0 and self._file is None and motion.number != self._failed and not part.skipped:
-                    why = part.end.stopped or "no command was played"
-                    self._show(
-                        "not_recorded", f"motion {motion.number}, {motion.setup.motion_kind}, is not recorded: {why}"
-                    )
+                    why = "no command was played" + (f"; {part.end.stopped}" if part.end.stopped else "")
+                    text = f"motion {motion.number}, {motion.setup.motion_kind}, is not recorded: {why}"
+                    self._show("not_recorded", text)
                 self._finish(part.end, stopped=part.end.stopped)
         except RcilabError as error:
             file, self._file, self._failed = self._file, None, motion.number

@@ -429,7 +429,8 @@ class Run:
     def __repr__(self) -> str:
         facts = [f"{self.duration:.3f} s", f"{len(self.cycles)} cycles"]
         if len(self.cycles):
-            facts.append(f"largest error {self._describe_error()}")
+            if self.plan is not None or self.setup.mode != "torque":  # Torques by themselves follow nothing.
+                facts.append(f"largest error {self._describe_error()}")
             facts.append(f"success rate {float(self.success_rate[-1]):.3f}")
         if self.missed_goal is not None:
             joint, angle = self.missed_goal

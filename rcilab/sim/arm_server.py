@@ -122,6 +122,8 @@ class ArmServer:
         self._next_check = 0.0
         self._cpu_latency_lock = CpuLatencyLock()
         self._missed_before = 0
+        self._was_moving = False
+        self._awaited = 0.0  # Time that cycles of this motion waited for commands that did not come, [s].
         self._logged_faults: tuple[FaultCode, ...] = ()
         client = None if config.client_host is None else (config.client_host, config.client_port)
         self._endpoint = Endpoint(config.host, server.channels, client)
@@ -367,6 +369,7 @@ class ArmServer:
         while (controller.is_starved or controller.awaits_start) and not (self._network.has_lost or self._is_ending):
             remaining = deadline - self._clock.now()
             if remaining <= 0.0:
+                self._awaited += self._patience
                 break
             self._poll(min(remaining, _CHECK_PERIOD))
             self._check_periodically()
@@ -426,7 +429,6 @@ class ArmServer:
 
         Returns whether the sockets were served meanwhile.
         """
-        was_moving = self.controller.is_moving
         is_idle = self._is_idle
         self._catch_up()
         self._advance()
@@ -438,8 +440,10 @@ class ArmServer:
         self._arrived = self.controller.arm.playout.arrived
         if self._capture is not None:
             self._capture.write()
-        if self.controller.is_moving is not was_moving and not self.config.lockstep:
-            self._log_slip()
+        if self.controller.is_moving is not self._was_moving:
+            self._was_moving = not self._was_moving
+            if not self.config.lockstep:
+                self._log_slip()
         self._server.settle()
         self._check_periodically()
         return is_idle
@@ -487,13 +491,17 @@ class ArmServer:
 
     def _log_slip(self) -> None:
         """Logs by how much a motion took longer than planned, after its end."""
-        if not self.controller.is_moving and self.missed - self._missed_before >= SLIP:
-            slipped = 1e3 * CYCLE_TIME * (self.missed - self._missed_before)
-            text = (
-                f"that motion took {slipped:.0f} ms longer than planned: the machine was busy or a stall was simulated"
-            )
-            self._log.write("slip", text, milliseconds=round(slipped))
-        self._missed_before = self.missed
+        missed, awaited = CYCLE_TIME * (self.missed - self._missed_before), self._awaited
+        self._missed_before, self._awaited = self.missed, 0.0
+        if self._was_moving:
+            return
+        for slipped, why in (
+            (missed, "the machine was busy or a stall was simulated"),
+            (awaited, "cycles waited for commands that did not come"),
+        ):
+            if slipped >= SLIP * CYCLE_TIME:
+                text = f"that motion took {1e3 * slipped:.0f} ms longer than planned: {why}"
+                self._log.write("slip", text, milliseconds=round(1e3 * slipped))
 
     def _advance(self, *, is_sent: bool = True) -> None:
         """Advances by one cycle."""

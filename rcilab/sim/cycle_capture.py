@@ -43,6 +43,7 @@ _NAN = math.nan  # A global name is found faster.
 _RESERVE = 2048  # [rows] That are written before the next look at `has_room`, and those that may still change.
 _FARTHEST = 1024  # [rows] Whose commands may be added; then readers take the row.
 _LONGEST_QUEUE = 256  # Commands that may wait for a row: no queue of the arm is longer.
+_ROUNDING = 1e-6  # [rad/s] Of joints that stand.
 _STANDSTILL = 0.02  # [rad/s] Of commanded joints, for a client that ends within a cycle of standstill. A tuning value.
 
 
@@ -383,7 +384,7 @@ class CycleCapture:
         is_too_fast = is_streamed and self._arm.mode.kind is not CommandKind.TORQUES and speed >= _STANDSTILL
         if not (self._arm.ends_by_command or is_too_fast):
             return Remark("")
-        if not (is_streamed and speed > 0.0):
+        if not (is_streamed and speed > _ROUNDING):
             return Remark("the client stopped the motion without a last command", "client_stopped_early")
         sentence = f"the client stopped the motion while joint {joint + 1} moved at {speed:.3g} rad/s"
         return Remark(sentence, "client_stopped", joint=joint + 1, speed=speed)

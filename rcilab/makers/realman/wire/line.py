@@ -128,7 +128,7 @@ def decode_request(line: bytes) -> Request:
     try:
         content = msgspec.json.decode(line)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise DecodeError(f"no valid JSON: {error}") from error
+        raise DecodeError(str(error)) from error
     command = content.get("command") if isinstance(content, dict) else None
     if not isinstance(command, str):
         raise DecodeError("no object with a command")

@@ -216,7 +216,8 @@ class XArmSettings:
             radius: Of the arc to the next motion, [m]; None: the arm stops between them.
             wait: Whether to return when the queue has ended, not at once.
         """
-        q = bounded_vector("goal", goal, self._joints, "rad")
+        ranges = self._own_ranges
+        q = bounded_vector("goal", goal, self._joints, "rad", ranges.lower, ranges.upper)
         options = _speed_options(speed, acceleration, JOINT_VELOCITY, JOINT_ACCELERATION, "rad", 1.0)
         self._move("set_servo_angle", wait, angle=q.tolist(), radius=_radius(radius), **options)
 
