@@ -479,6 +479,35 @@ def test_a_motion_of_which_only_cycles_without_a_command_were_read_is_named(ring
     assert line.startswith("motion 1 is not recorded: in what was read no command was played; 2501 of its 18884 cycles")
 
 
+def test_every_motion_that_was_overwritten_as_a_whole_says_so(ring: CycleRing, tmp_path: Path) -> None:
+    lines: list[str] = []
+    recorder = ClientRecorder(tmp_path, ring, lambda kind, text: lines.append(text))
+    for motion in (1, 2, 3):
+        first = 1000 * (motion - 1)
+        ring.add_event(begin_event(motion, first))
+        synthetic_rows(ring, first, 1000, motion)
+        ring.add_event(end_event(motion, first + 1000))
+    synthetic_rows(ring, 3000, CAPACITY + 1000, motion=0)
+    recorder.poll()
+    recorder.close()
+    assert len(lines) == 3
+    for motion, line in enumerate(lines, start=1):
+        assert line.startswith(
+            f"motion {motion}: 1000 cycles which were all of it, are not recorded; they were overwritten"
+        )
+
+
+def test_a_motion_without_a_played_command_names_its_end_as_well(ring: CycleRing, tmp_path: Path) -> None:
+    lines: list[str] = []
+    recorder = ClientRecorder(tmp_path, ring, lambda kind, text: lines.append(text))
+    ring.add_event(begin_event(1, 0))
+    synthetic_rows(ring, 0, 100, played=False)
+    ring.add_event({**end_event(1, 100), "stopped": {"said": "a push", "code": "", "facts": {}}})
+    recorder.poll()
+    recorder.close()
+    assert lines == ["motion 1, joint_position, is not recorded: no command was played; a push"]
+
+
 def test_motions_whose_events_were_overwritten_are_named(ring: CycleRing, tmp_path: Path) -> None:
     lines: list[str] = []
     recorder = ClientRecorder(tmp_path, ring, lambda kind, text: lines.append(text))

@@ -30,7 +30,7 @@ def test_a_bare_line_feed_ends_no_line_and_a_line_without_end_is_too_long():
     reader = LineReader()
     assert reader.feed(b'{"command":"a"}\n') == []
     (line,) = reader.feed(b'{"command":"b"}\r\n')
-    with pytest.raises(DecodeError, match="JSON|utf-8|nested|recursion"):
+    with pytest.raises(DecodeError, match="JSON is malformed"):
         decode_request(line)
     with pytest.raises(DecodeError, match="CR LF"):
         reader.feed(b"x" * (LONGEST_LINE + 1))

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 
 import pytest
 
+from rcilab.makers.ufactory.controller.xarm_controller import XArmController
 from rcilab.makers.virtual_controller import build_virtual_controller
 from rcilab.sim.arm_server import ArmServer
 from rcilab.sim.controller_config import ControllerConfig
@@ -98,3 +99,25 @@ def test_several_arms_have_an_address_each() -> None:
                 client.sendall(GET_VERSION)
                 server.server._poll(PATIENCE)
                 assert client.recv(100)[8:12] == name
+
+
+def test_a_motion_is_not_charged_with_cycles_that_were_missed_before_it(server: Server) -> None:
+    """It begins between two cycles, as a request does that is served while none is computed."""
+    loop, controller = server.server, server.server.controller
+    assert isinstance(controller, XArmController)
+    controller.enable(8, True)
+    controller.set_mode(1)
+    controller.set_state(0)
+    loop._step(loop._clock.now())
+    loop._timer.missed += 2000
+    goal = [q + 0.01 for q in controller.arm.commanded.q]
+    controller.follow(1, lambda planner: planner.follow_joints(goal, mode="linear"))
+    moved = False
+    for _ in range(2000):
+        loop._step(loop._clock.now())
+        moved = moved or controller.is_moving
+        if moved and not controller.is_moving:
+            break
+    assert moved
+    assert not controller.is_moving
+    assert "longer than planned" not in server.log
