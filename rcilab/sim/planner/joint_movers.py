@@ -179,11 +179,6 @@ class StreamMover:
         return _state_of(self._axes)
 
     @property
-    def curve(self) -> list[float]:
-        """The smoothed angles of this cycle, which the joints follow, n plain floats, [rad]."""
-        return list(self._before)
-
-    @property
     def is_stationary(self) -> bool:
         """Whether the arm stands at the newest angles."""
         if self._is_stationary is None:

@@ -153,12 +153,6 @@ class Planner:
         return mover.target if isinstance(mover, StreamMover) else None
 
     @property
-    def stream_curve(self) -> list[float] | None:
-        """Where the smoothed curve of a stream is in this cycle, n plain floats, [rad]; None while none is followed."""
-        mover = self._mover
-        return mover.curve if isinstance(mover, StreamMover) else None
-
-    @property
     def progress(self) -> float:
         """Share of the path of the current target, 0 to 1; 1 without one."""
         return self._queue.progress

@@ -14,6 +14,7 @@ import numpy as np
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.limits import Limits
+from rcilab.core.spatial import Pose
 from rcilab.makers.realman.bounds import ANGLE_STEP, SPEED_ALLOWANCE
 from rcilab.makers.realman.controller.tool_watch import ToolWatch
 from rcilab.motion.bounds import range_from
@@ -36,7 +37,6 @@ class ArmDrive:
         arm: The arm.
         planner: The planner.
         events: Those of the planner in the last step.
-        watches_tool: Whether streamed angles are those of poses along a curve, so that the tool's speed is observed.
 
     Args:
         arm: The arm after power-up.
@@ -54,8 +54,8 @@ class ArmDrive:
         self._only_shown: list[float] | None = None  # Joint angles of a simulated arm.
         self.planner = Planner(arm.model, limits, arm.commanded.q)
         self.events: tuple[PlannerEvent, ...] = ()
-        self.watches_tool = False
-        self._tool: ToolWatch | None = None
+        self._tool = ToolWatch()
+        self._too_fast: tuple[LimitViolation, ...] = ()  # What the last streamed poses exceed.
 
     @property
     def q(self) -> JointVector:
@@ -116,6 +116,7 @@ class ArmDrive:
 
     def abort(self) -> None:
         """Stops the arm by itself, as after a fault, and discards all targets."""
+        self._tool.reset()
         self.arm.discard_motion()
         self.planner.reset(self.q_c)
         self._is_stopping = self._only_shown is None
@@ -137,9 +138,9 @@ class ArmDrive:
             self._begin()
         self._number += 1
         result = arm.step(ArmCommand(self._number, tuple((np.array(q) + self._zero).tolist())))
-        too_fast = self._check_tool()
-        if too_fast:
-            result = StepResult(measured_violations=(*result.measured_violations, *too_fast))
+        if self._too_fast:
+            result = StepResult(measured_violations=(*result.measured_violations, *self._too_fast))
+            self._too_fast = ()
         if result.command_violations or result.measured_violations:
             self.abort()
             self.events += planner.take_events()
@@ -148,16 +149,19 @@ class ArmDrive:
             arm.discard_motion()
         return result
 
-    def _check_tool(self) -> tuple[LimitViolation, ...]:
-        """Returns which bounds the tool exceeds along the curve of streamed poses."""
-        curve = self.planner.stream_curve if self.watches_tool else None
-        if curve is None:
-            self._tool = None
-            return ()
-        q = np.array(curve) + self._zero
-        if self._tool is None:
-            self._tool = ToolWatch(self.arm.model, self._limits.cartesian, q)
-        return self._tool.step(q)
+    def watch_tool(self, cycle: int, pose: Pose) -> None:
+        """Observes a pose before it is followed along a curve.
+
+        Args:
+            cycle: Number of the cycle in which it came.
+            pose: Of the tool in base.
+        """
+        standing = self.arm.model.forward(self.q) if self.is_still else None
+        self._too_fast = self._tool.take(cycle, pose, self._limits.cartesian, standing)
+
+    def end_tool_watch(self) -> None:
+        """Ends the stream of poses that are observed: other commands came."""
+        self._tool.reset()
 
     def _begin(self) -> None:
         arm = self.arm

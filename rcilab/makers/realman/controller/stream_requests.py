@@ -38,7 +38,7 @@ def _joints(controller: RealManController, request: Request) -> None:
     mode, smoothing = _read_smoothing(request)
     refusal = controller.drive.planner.follow_joints(q, mode=mode, smoothing=smoothing)
     _follow(controller, "joint", refusal)
-    controller.drive.watches_tool = False
+    controller.drive.end_tool_watch()
 
 
 def _follow_joints(controller: RealManController, request: Request) -> None:
@@ -51,8 +51,11 @@ def _pose(controller: RealManController, request: Request) -> None:
     pose = _read_pose(controller, request)
     controller.begin_command()
     mode, smoothing = _read_smoothing(request)
+    if mode == "direct":
+        controller.drive.end_tool_watch()
+    else:
+        controller.drive.watch_tool(controller.cycle_number, pose)
     _follow(controller, "pose", controller.drive.planner.follow_tool(pose, mode=mode, smoothing=smoothing))
-    controller.drive.watches_tool = mode != "direct"
 
 
 def _follow_pose(controller: RealManController, request: Request) -> None:

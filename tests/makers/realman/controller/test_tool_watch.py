@@ -88,3 +88,25 @@ def test_angles_poses_without_a_curve_and_velocities_are_not_watched():
         bench.run(5)
     bench.run(500)
     assert bench.err == NO_ERROR
+
+
+@pytest.mark.parametrize("mode", [CURVE, FILTER])
+@pytest.mark.parametrize("is_timed", [False, True], ids=["pose by pose", "by its clock"])
+def test_a_client_that_is_held_up_inside_the_limits_is_no_error(mode, is_timed):
+    """It goes on where it was, or where its clock is: pauses of up to 60 ms at 0.2 m/s, and an end at that speed."""
+    bench, now, speed = Bench(), 0, 0.2
+    start, ramp = bench.pose, 0.2 / (0.9 * ACCELERATION[DOWN])
+    number, pause = 0, iter((20, 40, 60))
+    while (t := (1e-3 * now if is_timed else 5e-3 * number)) < 0.8:
+        way_down = speed * (t - 0.5 * ramp) if t > ramp else 0.5 * speed / ramp * t * t
+        bench.send(
+            "movep_canfd",
+            pose=[*start[:2], start[2] - int(1e6 * way_down), *start[3:]],
+            follow=True,
+            trajectory_mode=mode,
+        )
+        wait = next(pause, 5) if number in (50, 80, 110) else 5
+        bench.run(wait)
+        now, number = now + wait, number + 1
+    bench.run(500)
+    assert bench.err == NO_ERROR
