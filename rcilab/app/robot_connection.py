@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from rcilab.app.arm_features import explain_missing_robot
 from rcilab.app.status_text import StartingError
 from rcilab.control_process import Supervisor, SupervisorStatus
+from rcilab.control_process.process_supervisor import failed_start
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.core.memory import memory_needed
 
@@ -31,6 +32,7 @@ class RobotConnection:
         self._current: Supervisor | None = None
         self._shown: Supervisor | None = None  # The one of the current model.
         self._ready: Supervisor | None = None  # Only one that start() has built; it takes requests.
+        self._failure: SupervisorStatus | None = None  # The status after a supervisor that could not be started.
         self._generation = 0
         self._worker: threading.Thread | None = None
         self.name = ""
@@ -54,7 +56,7 @@ class RobotConnection:
         with self._lock:
             self._generation += 1
             generation, previous = self._generation, self._worker
-            self._ready = self._shown = None
+            self._ready = self._shown = self._failure = None
             self._wants_connection, self.name = True, target
             self._work(self._replace, generation, previous, model, target, plant, setup)
 
@@ -63,7 +65,7 @@ class RobotConnection:
         with self._lock:
             self._generation += 1
             previous = self._worker
-            self._ready = self._shown = None
+            self._ready = self._shown = self._failure = None
             self._wants_connection = False
             self._work(self._close_current, previous)
 
@@ -80,8 +82,10 @@ class RobotConnection:
             current.close()
 
     def status(self) -> SupervisorStatus:
-        """Returns the supervisor's snapshot; "starting" before the first one."""
-        shown = self._shown
+        """Returns the supervisor's snapshot; "starting" before the first one, "crashed" if it could not be started."""
+        failure, shown = self._failure, self._shown
+        if failure is not None:
+            return failure
         if shown is not None:
             return shown.status()
         if self._worker is None or not self._wants_connection:
@@ -169,9 +173,8 @@ class RobotConnection:
         except RcilabError as error:
             with self._lock:
                 if generation == self._generation:
-                    self._wants_connection = (
-                        False  # Else a supervisor whose creation failed would be starting for ever.
-                    )
+                    code = failed_start(error)
+                    self._failure = SupervisorStatus(phase="crashed", code=code, message=str(error), target=target)
             self._on_failure(error)
             return
         with self._lock:

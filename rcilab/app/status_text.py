@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from rcilab.control_process.launch import START_TIMEOUT
 from rcilab.control_process.process_supervisor import ANSWER_TIMEOUT
 from rcilab.core.errors import (
     CertificateError,
@@ -25,7 +26,9 @@ from rcilab.i18n.translator import LiteralText, Message, Text, message
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
 
-_CRASHES = ("crashed.controller", "crashed.worker", "crashed.frozen")
+FAILED_STARTS = ("crashed.slow_start", "crashed.no_start")
+"""States without a robot to reconnect."""
+_CRASHES = ("crashed.controller", "crashed.worker", "crashed.frozen", *FAILED_STARTS)
 _PHASES = {
     **{code: f"phase.{code}" for code in _CRASHES}, "moving.held": "phase.held", "moving.guided": "phase.guided",
     "fault.released": "phase.released", "lost.rebooted": "phase.rebooted", "watched.idle": "phase.watched",
@@ -123,7 +126,7 @@ def phase_code(status: SupervisorStatus) -> str:
 def _describe_loss(code: str, status: SupervisorStatus) -> Message:
     """Returns what was lost, and what to press; the message for our own controller does not mention a cable."""
     if code in _CRASHES:
-        return message(f"incident.{code}", next=message(_what_follows(status)))
+        return message(f"incident.{code}", seconds=f"{START_TIMEOUT:g}", next=message(_what_follows(status)))
     if code == "lost.other_arm":
         return message("incident.lost.other_arm", address=status.target)
     if status.target == "virtual":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import partial
 
@@ -320,6 +321,7 @@ class _MotionChecker:
             broken=0 if is_violated is None else int(np.count_nonzero(is_violated)),
             links=self._signals.links(condition, row),
             start_excess=self._signals.start_excess if condition.signal == "position" else 0.0,
+            limits=_uneven_limits(lower, upper, column),
         )
         if is_violated is None:
             return result, []
@@ -442,6 +444,15 @@ def _nearest_bound(value: float, lower: Array, upper: Array, row: int, column: i
         return float((upper if value >= 0.0 else lower)[row, column])
     low, high = float(lower[column]), float(upper[column])
     return high if value >= (low + high) / 2.0 else low
+
+
+def _uneven_limits(lower: Array, upper: Array, column: int) -> tuple[float, float] | None:
+    """Returns both bounds, if their middle is not 0 and they do not depend on the joint angles."""
+    if lower.ndim == 2:
+        return None
+    low, high = float(lower[column]), float(upper[column])
+    is_uneven = math.isfinite(low) and math.isfinite(high) and not math.isclose(high, -low)
+    return (low, high) if is_uneven else None
 
 
 def _lengthened(ratio: Array, count: int) -> Array:

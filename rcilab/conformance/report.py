@@ -50,6 +50,8 @@ class ConditionResult:
     start_excess: float = 0.0
     """Distance of the tool outside the safety box at the start, from where it may move inwards, [m]; 0 inside, and in
     all other rows."""
+    limits: tuple[float, float] | None = None
+    """Both bounds of a range whose middle is not 0, from which `ratio` is counted; None for other conditions."""
 
     @property
     def ok(self) -> bool:

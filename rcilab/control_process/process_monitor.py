@@ -7,6 +7,7 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from rcilab.control_process.launch import START_TIMEOUT
 from rcilab.control_process.layout import ControlBlock, Counter
 from rcilab.control_process.messages import Connect, Request, WorkerSettings
 from rcilab.control_process.process_supervisor import ANSWER_TIMEOUT, ProcessSupervisor
@@ -121,7 +122,7 @@ class ProcessMonitor:
         """
         deadline = time.monotonic() + timeout
         while True:
-            phase, _, message = self.find_phase()
+            phase, code, message = self.find_phase()
             if phase not in ("starting", "connecting"):
                 break
             if time.monotonic() > deadline:
@@ -130,7 +131,8 @@ class ProcessMonitor:
                 ).coded("slow_start", seconds=f"{timeout:g}")
             time.sleep(_PERIOD / 2)
         if phase == "crashed":
-            raise ConnectionLostError(message)
+            error = ConnectionLostError(message)
+            raise error.coded("slow_start", seconds=f"{START_TIMEOUT:g}") if code == "crashed.slow_start" else error
 
     def require_block(self) -> ControlBlock:
         """Returns the shared block. Call it with the lock held.

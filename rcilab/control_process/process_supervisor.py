@@ -13,7 +13,7 @@ from rcilab.control_process.layout import ControlBlock, Counter
 from rcilab.control_process.managed_process import ManagedProcess, parent_pid
 from rcilab.control_process.snapshot import read_snapshot
 from rcilab.control_process.status import MESSAGES
-from rcilab.core.errors import ConnectionLostError
+from rcilab.core.errors import ConnectionLostError, RcilabError
 from rcilab.makers.maker import find_maker
 from rcilab.sim.controller_config import MODE_DELAY, SUPERVISED_PREFILL
 
@@ -36,6 +36,11 @@ class ProcessExit:
     """Whether it was the control process: all pending requests are lost."""
     is_restarted: bool = False
     """Whether it is being started again."""
+
+
+def failed_start(error: RcilabError) -> str:
+    """Returns the code of the status, a key of `MESSAGES`, after an error at the start."""
+    return "crashed.slow_start" if error.code == "slow_start" else "crashed.no_start"
 
 
 class ProcessSupervisor:
@@ -148,7 +153,7 @@ class ProcessSupervisor:
             self.address = controller.address
         except ConnectionLostError as error:  # It was never ready: another attempt would fail as well.
             self._end_controller()
-            return ProcessExit(code="crashed.controller", message=str(error), is_worker=False)
+            return ProcessExit(code=failed_start(error), message=str(error), is_worker=False)
         if controller.is_alive:
             return None
         how = controller.exit_description

@@ -27,7 +27,7 @@ PHASES: tuple[Phase, ...] = (
     "stopping",  # a motion is being stopped before its end
     "fault",  # the controller has error bits set; recover() clears them
     "lost",  # no states arrive, or the controller closed the connection; reconnect() tries again
-    "crashed",  # a process has ended unexpectedly; it is being restarted, or restart() does so
+    "crashed",  # a process has ended unexpectedly, or did not start; it is being restarted, or restart() does so
     "closed",  # before start() and after close()
 )
 
@@ -62,6 +62,8 @@ MESSAGES: dict[str, str] = {
     "crashed.controller": "The virtual controller has ended unexpectedly ({how}); {next}. The arm is then at its "
     "initial pose{power}.",
     "crashed.worker": "The control process has ended unexpectedly ({how}); {next}.",
+    "crashed.slow_start": "{error}",
+    "crashed.no_start": "{error}",
     "crashed.frozen": "The control process has not responded for {seconds:.1f} s; {next}.",
 }
 """Messages by code, for translation; names in braces are placeholders."""

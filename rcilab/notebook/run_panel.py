@@ -20,7 +20,7 @@ from rcilab.app.run.plan_readiness import arm_obstacle, ask_to_move, plan_obstac
 from rcilab.app.run.robot_requests import Outcome, RobotRequests
 from rcilab.app.run.world_actions import WorldActions
 from rcilab.app.session_connection import SessionConnection
-from rcilab.app.status_text import StartingError
+from rcilab.app.status_text import FAILED_STARTS, StartingError
 from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.control_process.supervisor import VIRTUAL
 from rcilab.core.errors import SAFETY_STOP, PlanningError, RcilabError
@@ -342,7 +342,8 @@ class RunPanel(Part):
         self.power_on.disabled = not is_ready or powered is not False or is_pressed
         self.power_off.disabled = not is_ready or powered is not True
         is_held = is_pressed and not capabilities_of(state.model).stop_is_error
-        self.recover.disabled = phase not in ("fault", "lost", "crashed") or is_held
+        is_failed = status is not None and status.code in FAILED_STARTS
+        self.recover.disabled = phase not in ("fault", "lost", "crashed") or is_held or is_failed
         name = (
             ""
             if state.robot is None

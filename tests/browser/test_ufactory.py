@@ -9,9 +9,14 @@ from browser.other_arm import switch_arm
 from browser.test_settings import choose
 from rcilab.app.goal.goal_actions import SetSpeed
 from rcilab.app.setup.configuration_state import pending_parts
-from rcilab.app.view_actions import SetView
+from rcilab.app.view_actions import Seek, SetView
 
 pytest.importorskip("xarm", reason="the extra xarm is not installed")
+
+
+_CUT = """() => [...document.querySelectorAll('button *')].filter(
+  (part) => part.offsetParent && part.innerText && part.scrollWidth > part.clientWidth
+).map((part) => part.innerText)"""
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +102,20 @@ def test_an_emergency_stop_stays_an_error_until_recover(xarm7, heard):
     page.wait(lambda: page.status.phase == "idle" and bool(page.status.powered), "a ready arm")
     page.button("Plan from here").click()
     page.wait(lambda: page.button("Execute").is_enabled(), "the way to go on")
+
+
+def test_no_name_of_a_fault_is_cut_and_its_arm_is_drawn_at_the_end_of_the_record_too(xarm7):
+    page = xarm7
+    page.open_tab("Learn")
+    page.wait(lambda: page.button("Servo tool speed").is_visible(), "its faults")
+    assert page.tab.evaluate(_CUT) == []
+    page.button("Servo tool speed").click()
+    page.wait(lambda: page.state.learn.show is not None, "the fault on show", 40.0)
+    page.bench.dispatcher.ask(Seek(playhead=1.0))
+    end = page.state.learn.show.displayed.scene.motion.goal
+    page.wait(lambda: page.state.playhead == 1.0 and page.shows("plan", end), "the arm at the end of the record")
+    page.button("Back to the fault lab").click()
+    page.wait(lambda: page.button("Servo tool speed").is_visible(), "the fault lab")
 
 
 def test_it_speaks_chinese(xarm7):

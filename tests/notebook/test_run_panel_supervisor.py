@@ -225,6 +225,14 @@ class Real:
     def close(self) -> None: ...
 
 
+def test_after_a_start_that_failed_there_is_nothing_to_recover() -> None:
+    with notebook.RunPanel(PRO7) as panel:
+        panel._take(Real(PRO7.home, phase="crashed", code="crashed.slow_start"))  # type: ignore[arg-type]
+        panel.state.notify("robot")
+        assert panel.recover.disabled
+        assert "press Disconnect, then Connect" in panel._note.value
+
+
 def test_a_robot_is_moved_after_an_explicit_yes_only_and_by_no_drag() -> None:
     with notebook.RunPanel(PRO7) as panel, notebook.JogPanel(panel) as jog:
         robot = Real(PRO7.home)

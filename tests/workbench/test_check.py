@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rcilab.app.check.check_actions import CheckActions, PressCheck, plot_of
-from rcilab.app.check.report_rows import row_tone, row_word
+from rcilab.app.check.report_rows import row_facts, row_tone, row_word
 from rcilab.app.check.slowdown_job import scaled, slow_to_goal
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import GoalActions
@@ -273,6 +273,16 @@ def test_the_tab_says_where_the_controller_chooses_the_elbow(name: str, is_free:
     assert ("工具在此规划的目标处" in Text("zh").render(done)) is is_free
     assert (there.motion is motion) is not is_free
     assert there.completed("joint_position").motion is motion
+
+
+def test_the_share_of_an_uneven_range_can_be_derived_from_what_is_shown() -> None:
+    model = load_model("xArm7")
+    report = check(plan_joint(model, model.home, model.home + 0.01, speed=0.3), model)
+    row = next(row for row in report.rows if row.id == "joint.position")
+    assert (row.joint, f"{row.ratio:.3f}") == (4, "0.398")  # (107 - 60) / (107 + 11).
+    assert row_facts(row, Text("en"))[0] == "60°, range -11° to 225° (0 % at 107°)"
+    assert row_facts(row, Text("zh"))[0] == "60°，范围 -11° 至 225°（107° 处为 0 %）"
+    assert all(row.limits is None for row in report.rows if row.id != "joint.position")
 
 
 @pytest.mark.parametrize("phase", ["closed", "lost", "crashed"])

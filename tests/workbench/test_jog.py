@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from dataclasses import replace
 from types import SimpleNamespace
@@ -30,12 +31,15 @@ from rcilab.app.jog.jog_state import (
 )
 from rcilab.app.jog.jog_step import step_pose, take_step
 from rcilab.app.store import Store, UiState
+from rcilab.app.text import Text
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import ControlError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
+from rcilab.i18n.units import Units
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.robot_model import load_model
+from rcilab.workbench.panels.jog import margin_html
 from tests.workbench.opened import opened, wait
 
 MODEL = load_model("xMatePro7")
@@ -207,6 +211,21 @@ def test_a_held_button_jogs_the_robot_and_its_release_ends_that_at_once(jog, rob
     jog.set_jog(SetJog(frame="tool"))
     hold(jog, "z", 1)
     assert robot.held[0] == "tool"
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "units", "shown"),
+    [
+        ("FR3", 0, Units(), "-157…157|157° left"),  # 157.569
+        ("FR3", 3, Units(), "-174…-9|◆ 0.0° left"),  # -174.6 to -8.354
+        ("xArm7", 3, Units(), "-11…225|11° left"),
+        ("FR3", 0, Units(angle="rad"), "-2.75…2.75|2.75 left"),
+    ],
+)
+def test_limits_and_the_way_to_them_are_rounded_inwards(name, joint, units, shown):
+    limits = load_model(name).limits.joint
+    html = margin_html(0.0, float(limits.lower[joint]), float(limits.upper[joint]), Text("en", units))
+    assert re.sub(r"\|+", "|", re.sub(r"<[^>]*>", "|", html)).strip("|") == shown
 
 
 def test_silence_ends_it(jog, robot, monkeypatch):

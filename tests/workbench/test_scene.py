@@ -252,7 +252,7 @@ def test_the_arm_is_said_to_be_moved_only_while_it_is(bench):
     bench.store.update(plan=None, no_plan=None, jog=replace(bench.state.jog, robot=True))
 
     def said(phase: str, code: str) -> str:
-        status = SimpleNamespace(q_c=HOME, phase=phase, code=code)
+        status = SimpleNamespace(q=HOME, q_c=HOME, phase=phase, code=code)
         return TimelinePanel(Text("en"), lambda request: None)._read(bench.state, status)
 
     by_hand = Text("en")("timeline.by_hand")

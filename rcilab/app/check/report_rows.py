@@ -42,7 +42,12 @@ def row_word(row: ConditionResult, text: Text) -> str:
 def row_facts(row: ConditionResult, text: Text) -> list[str]:
     """Returns the worst value, where it is, and when."""
     value, bound = row.displayed
-    if bound:
+    if row.limits is not None and row.has_share:
+        low, high = row.limits
+        numbers = text.units.format_numbers(row.unit, value, low, high, (low + high) / 2.0)
+        worst, lowest, highest, middle = (with_unit(number, row.unit, text) for number in numbers)
+        facts = [text("check.range", value=worst, low=lowest, high=highest, middle=middle)]
+    elif bound:
         facts = [value_against_bound(value, bound, row.unit, text)]
     else:
         (number,) = text.units.format_numbers(row.unit, value)

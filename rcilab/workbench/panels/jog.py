@@ -164,16 +164,27 @@ def speed_value_html(speed: float, text: Text) -> str:
 
 
 def margin_html(angle: float, low: float, high: float, text: Text) -> str:
-    """Returns the limits of a joint and its distance from the nearer one, [rad], as a bar and as text."""
+    """Returns the limits of a joint and its distance from the nearer one, [rad], as a bar and as text.
+
+    All are rounded towards the inside.
+    """
     left = max(min(angle - low, high - angle), 0.0)
     tone, sign = ("bad", "◆ ") if left < 1e-3 else ("warn", "▲ ") if left < NEAR_LIMIT else ("good", "")
     share = 100.0 * min(left / (0.5 * (high - low)), 1.0)
-    sentence = sign + text("jog.left", angle=text.units.format_angle(left, 0 if tone == "good" else 1))
-    ends = [text.units.format(bound, "rad.0f#") for bound in (low, high)]
+    digits, unit = 0 if tone == "good" else 1, "" if text.units.angle == "deg" else "#"  # The heading has it.
+    angle_left = text.units.format(_rounded_down(left, digits, text), f"rad.{digits}f{unit}")
+    limits = text.units.format([(-_rounded_down(-low, 0, text), _rounded_down(high, 0, text))], "rad.0f#")
     return (
-        f'<div class="rl-margin rl-{tone}"><span>{ends[0]}</span><i class="rl-meter"><i style="width:{share:.0f}%">'
-        f"</i></i><b>{esc(sentence)}</b><span>{ends[1]}</span></div>"
+        f'<div class="rl-margin rl-{tone}"><span>{limits}</span><i class="rl-meter">'
+        f'<i style="width:{share:.0f}%"></i></i><b>{esc(sign + text("jog.left", angle=angle_left))}</b></div>'
     )
+
+
+def _rounded_down(angle: float, digits: int, text: Text) -> float:
+    """Returns an angle, [rad], rounded down to decimals of a degree, or to two more of a radian."""
+    factor, name = text.units.from_si("rad")
+    step = 10.0 ** -(digits + 2 if name == "rad" else digits) / factor
+    return step * math.floor(angle / step + 1e-3)  # A limit of 224.9998 degrees is 225.
 
 
 def said_html(state: UiState, status: SupervisorStatus, text: Text) -> str:

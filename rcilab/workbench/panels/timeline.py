@@ -8,7 +8,7 @@ from rcilab.app.check.freshness import outdated
 from rcilab.app.program.program_draft import describe_place
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.played_motion import played_at, scaled_motion_of
-from rcilab.app.run.readiness import time_shown
+from rcilab.app.run.readiness import connection_note, is_plan_current, time_shown
 from rcilab.app.text import Text
 from rcilab.app.view_actions import PLOTS, RATES, Play, Seek, SetView, ShowPlot, has_plot
 from rcilab.core.clock import CYCLE_TIME
@@ -95,7 +95,9 @@ class TimelinePanel:
             elif state.watched:
                 sentence = text("timeline.watched")
             elif why is None or why.code == "plan.here":
-                sentence = text("timeline.jog" if state.jog.robot else "timeline.nothing")
+                lost = None if is_plan_current(state, status) else connection_note(state, status)
+                hint = "timeline.jog" if state.jog.robot else "timeline.nothing"
+                sentence = text(hint) if lost is None else text.render(lost)
             else:
                 sentence = text.render(why)
             return f'<p class="rl-note rl-welcome">{esc(sentence)}</p>'

@@ -140,7 +140,9 @@ class Stage:
 
     def _show_plan(self, state: UiState, status: SupervisorStatus, live: np.ndarray) -> None:
         plan = state.plan
-        if plan is None or is_moving(status) or not (state.playing or 0.0 < state.playhead < 1.0):
+        is_previewed = state.playing or 0.0 < state.playhead < 1.0
+        is_fault = state.learn.show is not None  # Its record may end at the fault, away from the goal.
+        if plan is None or is_moving(status) or not (is_previewed or is_fault):
             self._see("plan", None, False)
             return
         q = plan.motion.at(state.playhead * plan.motion.duration).q
