@@ -23,8 +23,9 @@ def test_a_controller_that_is_too_slow_is_named_until_it_is_started_again(
 ) -> None:
     monkeypatch.setattr("rcilab.control_process.launch.START_TIMEOUT", 0.0)
     with Workbench(WorkbenchConfig(port=0, quality="light")) as bench:
-        wait(lambda: bench.session.status().phase == "crashed" and not bench.session.is_ready, "the failure")
-        wait(lambda: bench.session.status().controller_pid is None, "the end of the processes")
+        wait(
+            lambda: (now := bench.session.status()).phase == "crashed" and now.incident is None, "the end of the start"
+        )
         state, status = bench.store.state, bench.session.status()
         printed = _print_problem(status, "")
         assert _print_problem(status, printed) == printed
