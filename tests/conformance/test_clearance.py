@@ -145,9 +145,13 @@ def test_check_and_monitors_give_the_same_verdict_in_every_cycle(model, seed, sp
     monitor.reset(q[0].tolist())
     report = check(Motion.from_cycles(q), model, distance=ASKED)
     played: dict[str, list[bool]] = {row.id: [] for row in clearance_conditions(ASKED)}
-    kept = True
+    kept, necessary = (
+        True,
+        {row.id for row in model.description.conditions().conditions if row.necessity == "necessary"},
+    )
     for row in [*q, *[q[-1]] * HOLD_SAMPLES]:
-        kept = (joints.step(row.tolist()) == []) & monitor.step(row.tolist()) & kept
+        kept &= not any(violation.condition.id in necessary for violation in joints.step(row.tolist()))
+        kept &= monitor.step(row.tolist())
         broken = {violation.condition.id for violation in monitor.violations()}
         for id_, flags in played.items():
             flags.append(id_ in broken)
@@ -156,7 +160,8 @@ def test_check_and_monitors_give_the_same_verdict_in_every_cycle(model, seed, sp
             assert cycles_of(report, row.id, len(played[row.id])) == played[row.id]
         if row.id in played:
             assert row.broken == sum(played[row.id])
-    assert report.ok == kept
+    monitored = {row.id for row in (*RCI_JOINT_CONDITIONS, *clearance_conditions(ASKED))}  # Not the tool's speed.
+    assert any(violation.condition.id in monitored for violation in report.violations) != kept
 
 
 @settings(max_examples=30)

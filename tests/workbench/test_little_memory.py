@@ -36,7 +36,7 @@ def test_a_robot_side_that_finds_no_memory_is_told_and_can_be_started_again(plac
         with Workbench(WorkbenchConfig(port=0, quality="light")) as bench:
             wait(lambda: told(bench) == "notice.error", "to be told")
             assert bench.store.state.notice.text.values["text"].code == "error.starved"
-            assert bench.session.status().phase == "closed", "it can be connected"
+            wait(lambda: bench.session.status().code == "crashed.no_start", "it can be connected")
             patch.undo()
             bench.dispatcher.ask(ChooseRobot(target="virtual"))
             wait(lambda: is_ready(bench), "an arm")
