@@ -209,7 +209,7 @@ def test_a_number_that_is_none_in_any_field_ends_the_motion_and_in_other_fields_
         is_used = field == USED[generator] or (field == "elbow" and generator >= wire.CARTESIAN_POSE)
         assert bool(ending.state.errors) is is_used, (field, ending.state.errors)
         assert ending.status == ("reflex" if is_used else "success")
-        last = robot.skip(60 if is_used else 3)  # What ends it stops the arm.
+        last = robot.skip(60)
         assert all(math.isfinite(value) for name in last.names for value in getattr(last, name))
 
 
