@@ -119,7 +119,13 @@ def test_what_was_granted_needs_no_advice(tree) -> None:
 
 @pytest.mark.parametrize(
     ("runtime", "verdict", "said"),
-    [("950000", "ok", "95%"), ("-1", "ok", "not throttled"), ("100000", "note", "10%"), ("x", "note", "unknown")],
+    [
+        ("950000", "ok", "95% of a core, then pause for up to 50 ms; for several arms on few cores"),
+        ("1000000", "ok", "not throttled"),
+        ("-1", "ok", "not throttled"),
+        ("100000", "note", "10%"),
+        ("x", "note", "unknown"),
+    ],
 )
 def test_a_small_real_time_share_is_noted(tree, runtime: str, verdict: str, said: str) -> None:
     files = {
