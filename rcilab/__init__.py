@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rcilab.cell.cell import Cell as Cell
     from rcilab.conformance.check import check as check
     from rcilab.conformance.motion_monitor import Monitor as Monitor
     from rcilab.conformance.report import Report as Report
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 __version__ = "0.2.0"
 
 _HOMES = {
+    "Cell": "rcilab.cell.cell",
     "CartesianPosition": "rcilab.core.command",
     "JointPosition": "rcilab.core.command",
     "JointTorque": "rcilab.core.command",

@@ -19,6 +19,7 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
     {"robots"},
     {"model"},
     {"motion"},
+    {"cell"},
     {"conformance"},
     {"sim", "recording", "views"},
     {"makers"},
@@ -34,10 +35,12 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
 HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
 
 FENCES = {
-    "pinocchio": ("model/", "diagnostics/bench/compare/"),  # There it is one of the compared.
-    "coal": ("model/kinematics/collision.py",),
+    "pinocchio": ("model/", "cell/cell_geometry.py", "diagnostics/bench/compare/"),  # There it is one of the compared.
+    "coal": ("model/kinematics/collision.py", "cell/"),
     "eigenpy": ("model/dynamics/symmetric_solver.py",),
     "ruckig": ("motion/_ruckig.py",),
+    "trimesh": ("cell/",),
+    "coacd": ("cell/convex_parts.py",),
     "mujoco": ("sim/mujoco_plant.py",),
     "viser": ("views/", "workbench/", "notebook/"),
     "meshcat": ("views/", "notebook/"),
@@ -59,6 +62,7 @@ LATE_TARGETS = {  # What a function may import, and why not the module.
     "rcilab.core.cycle_log": "loads numpy",
     "rcilab.model.dynamics.rigid_body": "loads pinocchio",
     "rcilab.model.dynamics.symmetric_solver": "loads eigenpy",
+    "rcilab.cell.cell_geometry": "loads coal and pinocchio",
     "rcilab.model.kinematics.collision": "loads coal and pinocchio",
     "rcilab.sim.mujoco_plant": "loads mujoco",
     "rcilab.views.meshcat_scene": "loads meshcat",

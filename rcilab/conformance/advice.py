@@ -105,6 +105,7 @@ _REMEDIES: dict[Signal, str] = {
     "frame": "advice.frame",
     "link_distance": "advice.clearance",
     "floor_distance": "advice.clearance",
+    "cell_distance": "advice.obstacle",
     "elbow_sign": "advice.elbow_sign",
     "external_torque": "advice.contact",
     "external_force": "advice.contact",

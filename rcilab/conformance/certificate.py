@@ -11,6 +11,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rcilab.cell.cell import Cell
 from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.start import StartState, as_start
 from rcilab.core.arrays import Unquoted
@@ -24,6 +25,8 @@ from rcilab.motion.motion import Motion, require_motion
 
 NO_SAFETY_BOX = "none"
 """Certificate part of a motion that was checked without a safety box."""
+NO_CELL = "none"
+"""Certificate part of a motion that was checked without a cell."""
 NOT_CHECKED = "not judged"  # The text is part of certificates in saved runs.
 """Certificate part of a motion whose distances were not checked; such a motion cannot be executed."""
 
@@ -43,7 +46,7 @@ class Certificate:
 
     @property
     def parts(self) -> Mapping[str, str]:
-        """Fingerprints by name: motion, model, limits, tool, load, safety box, safety distance, mode, start state."""
+        """Fingerprints by name: motion, `MODEL_PARTS`, safety box, safety distance, cell, mode, start state."""
         return MappingProxyType(dict(self.entries))
 
     @property
@@ -59,6 +62,7 @@ class Certificate:
         box: SafetyBox | None = None,
         distance: ClearanceLimit | None = None,
         mode: Mode = "joint_position",
+        cell: Cell | None = None,
     ) -> None:
         """Requires that this certificate is for this motion on this arm from this start.
 
@@ -71,6 +75,7 @@ class Certificate:
             distance: Required distances of the links from each other and from the floor; None accepts those of the
                 check. A motion whose distances were not checked is refused.
             mode: Mode in which the motion will run; each mode has its own conditions.
+            cell: The cell of the arm. Without one, a motion that was checked in a cell is accepted too.
 
         Raises:
             CertificateError: Something differs from the check; `.changed` and the message name it.
@@ -81,12 +86,14 @@ class Certificate:
         start = as_start(start_q, len(self.start_q)) if motion.n == len(self.start_q) else None
         current = {"motion": ""}
         if start is not None:
-            current = dict(issue_certificate(motion, model, start, box, distance, mode).entries)
+            current = dict(issue_certificate(motion, model, start, box, distance, mode, cell).entries)
         changed = [name for name, fingerprint in self.entries if current.get(name, fingerprint) != fingerprint]
         if start is not None and "start state" in changed and self._same_start(start):
             changed.remove("start state")
         if "safety box" in changed and active_box(box) is None:
             changed.remove("safety box")
+        if "cell" in changed and cell is None:
+            changed.remove("cell")
         if "safety distance" in changed and distance is None:
             changed.remove("safety distance")
         if self.parts.get("safety distance") == NOT_CHECKED and "safety distance" not in changed:
@@ -125,6 +132,11 @@ class Certificate:
                 "the certificate is stale: it does not cover the safety box that is set; check the motion again "
                 "with box=..., the box passed to robot.set_safety_box"
             )
+        if changed == ["cell"]:
+            return (
+                "the certificate is stale: it does not cover the cell that is set; check the motion again with "
+                "cell=robot.cell"
+            )
         if changed == ["safety distance"]:
             if self.parts["safety distance"] == NOT_CHECKED:
                 return "collisions were not checked: check the motion again, without distance=None"
@@ -160,6 +172,7 @@ def issue_certificate(
     box: SafetyBox | None = None,
     distance: ClearanceLimit | None = None,
     mode: Mode = "joint_position",
+    cell: Cell | None = None,
 ) -> Certificate:
     """Returns the certificate of a motion; only for a report that is ok."""
     fingerprints = model.fingerprint
@@ -168,6 +181,7 @@ def issue_certificate(
         **{name: fingerprints[name] for name in MODEL_PARTS},
         "safety box": _box_fingerprint(box),
         "safety distance": _distance_fingerprint(distance),
+        "cell": NO_CELL if cell is None else cell.fingerprint,
         "mode": mode,
         "start state": _start_fingerprint(start),
     }

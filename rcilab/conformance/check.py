@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rcilab.cell.cell import Cell, has_obstacles, require_cell, required_distance
 from rcilab.conformance.advice import advise
 from rcilab.conformance.catalogue import Phrase
 from rcilab.conformance.certificate import issue_certificate
@@ -44,6 +45,7 @@ def check(
     start: ArrayLike | StartState | None = None,
     box: SafetyBox | None = None,
     distance: ClearanceLimit | None = STANDARD_DISTANCE,
+    cell: Cell | None = None,
     mode: Mode = "joint_position",
 ) -> Report:
     """Checks a motion against the conditions of its robot's controller, and the distances between its links.
@@ -75,6 +77,7 @@ def check(
         box: The safety box, as set with `set_safety_box`; None, or an inactive box, is not checked.
         distance: Required distances of the links from each other and from the floor, and its height. None does not
             check them, for fast planning while a target is dragged; `execute` does not accept such a certificate.
+        cell: What the arm carries and what stands around it; its tool, load and floor count instead of the model's.
         mode: Mode in which the motion will run, as in `control`; the certificate is for this mode.
 
     Raises:
@@ -82,7 +85,7 @@ def check(
             valid for this arm.
         ModelError: The arm's controller has no such mode.
     """
-    return _check(motion, model, start, box, distance, mode)
+    return _check(motion, model, start, box, distance, cell, mode)
 
 
 def check_speed_change(motion: Motion, model: RobotModel, *, start: StartState | None, mode: Mode) -> Report:
@@ -96,7 +99,14 @@ def check_speed_change(motion: Motion, model: RobotModel, *, start: StartState |
     """
     is_free = leaves_elbow_free(model, mode)
     return _check(
-        motion, model, start, None, None, mode, record=Record(has_free_elbow=True, is_to_come=True) if is_free else None
+        motion,
+        model,
+        start,
+        None,
+        None,
+        None,
+        mode,
+        record=Record(has_free_elbow=True, is_to_come=True) if is_free else None,
     )
 
 
@@ -108,6 +118,7 @@ def check_torques(
     start: ArrayLike | StartState | None = None,
     box: SafetyBox | None = None,
     distance: ClearanceLimit | None = STANDARD_DISTANCE,
+    cell: Cell | None = None,
 ) -> Report:
     """Checks a recorded motion with the torques that were commanded, in torque mode.
 
@@ -121,12 +132,13 @@ def check_torques(
         start: As for `check`, also for the other two.
         box: The safety box.
         distance: Required distances of the links.
+        cell: As for `check`.
 
     Raises:
         InvalidValueError: An argument is not valid for this arm, or the numbers of rows differ.
     """
     rows = as_rows(torques, model.n, "torques", "N m", require_motion(motion).q)
-    return _check(motion, model, start, box, distance, "torque", rows)
+    return _check(motion, model, start, box, distance, cell, "torque", rows)
 
 
 def check_commands(
@@ -137,6 +149,7 @@ def check_commands(
     start: ArrayLike | StartState | None = None,
     box: SafetyBox | None = None,
     distance: ClearanceLimit | None = STANDARD_DISTANCE,
+    cell: Cell | None = None,
     mode: Mode = "joint_position",
 ) -> Report:
     """Checks the commands of a recorded motion, up to the last one.
@@ -152,12 +165,13 @@ def check_commands(
         start: As for `check`; a StartState where the beginning of the motion is not known.
         box: The safety box.
         distance: Required distances of the links.
+        cell: As for `check`.
         mode: Mode of the motion.
 
     Raises:
         InvalidValueError: As for `check`.
     """
-    return _check(motion, model, start, box, distance, mode, record=record)
+    return _check(motion, model, start, box, distance, cell, mode, record=record)
 
 
 def _check(
@@ -166,6 +180,7 @@ def _check(
     start: ArrayLike | StartState | None,
     box: SafetyBox | None,
     distance: ClearanceLimit | None,
+    cell: Cell | None,
     mode: Mode,
     torques: Array | None = None,
     record: Record | None = None,
@@ -179,6 +194,9 @@ def _check(
         raise InvalidValueError(
             "distance", described(distance), "is not a ClearanceLimit; use ClearanceLimit(links=...)"
         )
+    if cell is not None:
+        model = require_cell(cell).applied_to(model)
+        distance = required_distance(distance, cell)
     state = as_start(motion.start if start is None else start, model.n)
     mode = require_mode(mode)
     table = condition_table(model.description)
@@ -189,11 +207,20 @@ def _check(
         ).coded("no_feature", model=model.name, feature=mode)
     rows = table.rows(mode, has_elbow=bool(model.redundancy), has_box=box is not None)
     if distance is not None:
-        rows = (*rows, *clearance_conditions(distance))
+        rows = (*rows, *clearance_conditions(distance, has_obstacles=has_obstacles(cell)))
     if record is not None:
         rows = _rows_of_record(rows, record, state, mode)
     return _report(
-        motion, rows, model=model, start=state, box=box, distance=distance, mode=mode, torques=torques, record=record
+        motion,
+        rows,
+        model=model,
+        start=state,
+        box=box,
+        distance=distance,
+        cell=cell,
+        mode=mode,
+        torques=torques,
+        record=record,
     )
 
 
@@ -218,6 +245,7 @@ def _report(
     start: StartState,
     box: SafetyBox | None,
     distance: ClearanceLimit | None,
+    cell: Cell | None,
     mode: Mode,
     torques: Array | None = None,
     record: Record | None = None,
@@ -229,7 +257,7 @@ def _report(
         is_cut = len(followed) < len(motion)
         known = Record(was_stopped=is_cut, refused_pose=is_cut, has_free_elbow=True, is_to_come=not is_cut)
         rows = _rows_of_record(rows, known, start, mode)
-    checker = _MotionChecker(followed, model, start, box, distance, mode, torques, known)
+    checker = _MotionChecker(followed, model, start, box, distance, cell, mode, torques, known)
     results = [checker.evaluate(row) for row in rows]
     found = sorted((v for _, violations in results for v in violations), key=lambda v: -v.ratio)
     facts = {"model": model.name, "law": motion.law, "duration": f"{motion.duration:.3f}", "speed": f"{motion.speed:g}"}
@@ -243,10 +271,12 @@ def _report(
         measure=partial(checker.usage, rows, len(motion)),
         issue=_issue_none
         if torques is not None or record is not None
-        else partial(issue_certificate, motion, model, start, box, distance, mode),
+        else partial(issue_certificate, motion, model, start, box, distance, mode, cell),
         check_again=_refuse_other_motion
         if torques is not None
-        else partial(_report, model=model, start=start, box=box, distance=distance, mode=mode, record=record),
+        else partial(
+            _report, model=model, start=start, box=box, distance=distance, cell=cell, mode=mode, record=record
+        ),
     )
 
 
@@ -285,6 +315,7 @@ class _MotionChecker:
         start: StartState,
         box: SafetyBox | None,
         distance: ClearanceLimit | None,
+        cell: Cell | None,
         mode: Mode,
         torques: Array | None = None,
         record: Record | None = None,
@@ -292,7 +323,7 @@ class _MotionChecker:
         self._motion = motion
         self._limits = _limits_of(motion, model.limits, start)
         self._is_record = record is not None and not record.is_to_come
-        self._signals = MotionSignals(motion, model, start, box, distance, mode, torques, record)
+        self._signals = MotionSignals(motion, model, start, box, distance, mode, torques, record, cell)
         self._depth = min(box.size) / 2.0 if box is not None else 1.0
 
     def evaluate(self, condition: Condition) -> tuple[ConditionResult, list[Violation]]:

@@ -1,9 +1,11 @@
-"""Check of distances between links and from the floor, cycle by cycle, for user programs; no controller has it."""
+"""Check of distances between links, from floor and obstacles, cycle by cycle; no controller has it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rcilab.cell.cell import Cell, has_obstacles
+from rcilab.cell.clearance_query import build_query
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.clearance_path import sample_cycle
 from rcilab.conformance.limit_violation import LimitViolation
@@ -24,15 +26,16 @@ class ClearanceMonitor:
     Args:
         model: The arm.
         distance: Required distances. The monitor starts at `model.home`; `reset` sets another position.
+        cell: The cell of the arm; None without one.
     """
 
-    def __init__(self, model: RobotModel, distance: ClearanceLimit = STANDARD_DISTANCE) -> None:
-        from rcilab.model.kinematics.collision import ClearanceQuery
-
-        geometry = model.collision_geometry(distance)
-        self._n, self._levers = model.n, geometry.levers
-        self._query = ClearanceQuery(geometry)
-        self._rows = [(row, float(row.bounds(model.limits)[0][0])) for row in clearance_conditions(distance)]
+    def __init__(
+        self, model: RobotModel, distance: ClearanceLimit = STANDARD_DISTANCE, cell: Cell | None = None
+    ) -> None:
+        self._n, self._has_obstacles = model.n, has_obstacles(cell)
+        self._query, self._levers = build_query(model, distance, cell)
+        rows = clearance_conditions(distance, has_obstacles=self._has_obstacles)
+        self._rows = [(row, float(row.bounds(model.limits)[0][0])) for row in rows]
         self.reset(model.home)
 
     def reset(self, q: Sequence[float] | JointVector) -> None:
@@ -76,4 +79,6 @@ class ClearanceMonitor:
             "link_distance": min(self._query.links(q) for q in samples),
             "floor_distance": min(self._query.floor(q) for q in samples),
         }
+        if self._has_obstacles:
+            self._found["cell_distance"] = min(self._query.cell(q) for q in samples)
         self.distance, self.links = min(self._found.values())

@@ -60,8 +60,9 @@ def clearance_path(
     distance, links = np.full(len(rows), np.nan), np.zeros((len(rows), 2), dtype=np.intp)
 
     def compute(row: int) -> float:
-        distance[row], links[row] = found = query(rows[row])
-        return found[0]
+        value, pair = query(rows[row])
+        distance[row], links[row] = value, pair[:2]
+        return value
 
     computed = _advance(compute, travel, max(bounds))
     while True:

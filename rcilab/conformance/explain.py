@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rcilab.conformance.advice import factor_text, with_degrees
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, translate
-from rcilab.core.clearance import FLOOR, TOOL
+from rcilab.core.clearance import FLOOR, PART, TOOL
 from rcilab.core.condition import Condition
 from rcilab.core.errors import UsageError
 from rcilab.i18n.rounding import format_pair
@@ -213,8 +213,9 @@ def explain_place(found: ConditionResult | Violation, language: Language = "en")
         InvalidValueError: The language is unknown.
     """
     if found.links is not None:
-        first, second = (_link(number, _Writer(language)) for number in found.links)
-        return translate(language, "place.pair", first=first, second=second)
+        writer = _Writer(language)
+        first, second, obstacle = found.links
+        return translate(language, "place.pair", first=_link(first, writer), second=obstacle or _link(second, writer))
     return explain_axis(found.condition, found.joint, language)
 
 
@@ -269,7 +270,7 @@ def explain_limit(source: str, language: Language = "en") -> str:
 
 
 def _link(number: int, writer: _Writer) -> str:
-    key = {FLOOR: "floor", TOOL: "tool", 0: "base"}.get(number, "link")
+    key = {FLOOR: "floor", TOOL: "tool", PART: "part", 0: "base"}.get(number, "link")
     return writer.translate(f"place.{key}", number=str(number))
 
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rcilab.cell.cell import Cell, required_distance
 from rcilab.conformance.box_monitor import BoxMonitor
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
 from rcilab.conformance.clearance_monitor import ClearanceMonitor
@@ -63,8 +64,10 @@ class Monitor:
         *,
         box: SafetyBox | None = None,
         distance: ClearanceLimit | None = None,
+        cell: Cell | None = None,
     ) -> None:
         self._model, self.mode = require_model(model), require_mode(mode)
+        distance = required_distance(distance, cell)
         self._has_elbow = bool(model.redundancy)
         table, self._safety_box = condition_table(model.description), active_box(box)
         self._tracker = IkTracker(model) if self._has_elbow and table.has_free_elbow else None
@@ -72,7 +75,7 @@ class Monitor:
         self._own_rows = {row.id: row for row in table.conditions}
         rows = table.rows(self.mode, has_elbow=self._has_elbow)
         self._start_rows = [row for row in rows if row.stage == "start" and row.order == 0]
-        self._clearance = None if distance is None else ClearanceMonitor(model, distance)
+        self._clearance = None if distance is None else ClearanceMonitor(model, distance, cell)
         self._torques = None
         order = TORQUE_CONDITIONS if self.mode == "torque" else reversed(MOTION_TORQUE_CONDITIONS)
         torques = TorqueMonitor(limits.joint, _in_order(rows, order))

@@ -8,13 +8,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from rcilab.cell.cell import Cell, has_obstacles
+from rcilab.cell.clearance_query import build_query
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.clearance_path import ClearancePath, clearance_path
 from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.start import StartState, as_start
 from rcilab.conformance.tool_signals import ToolSignals
 from rcilab.core.arrays import Array, JointVector
-from rcilab.core.clearance import ClearanceLimit, LinkPair
+from rcilab.core.clearance import OBSTACLE, ClearanceLimit, LinkPair
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
 from rcilab.core.safety_box import EntryBox, SafetyBox, box_for_start
@@ -69,6 +71,7 @@ class MotionSignals:
         mode: Mode of the motion. Commanded torques are computed in every row, as the controller checks each.
         torques: Commanded torques, shape (N, n), [N m]; None: those of the motion.
         record: What else is known of the commands; None: a motion to come.
+        cell: The cell of the arm, or None.
     """
 
     def __init__(
@@ -81,6 +84,7 @@ class MotionSignals:
         mode: Mode = "joint_position",
         torques: Array | None = None,
         record: Record | None = None,
+        cell: Cell | None = None,
     ) -> None:
         self._motion = motion
         self._record = record
@@ -89,6 +93,7 @@ class MotionSignals:
         self._start = start
         self._box = box
         self._distance = distance
+        self._cell = cell
         self._mode: Mode = mode
         hold = HOLD_SAMPLES if record is None or record.is_to_come else 0
         self._differences = _backward_differences(motion.q, start, hold)
@@ -113,7 +118,10 @@ class MotionSignals:
         """Returns the two links of the distance in a row of a table; None for other conditions."""
         if not condition.is_clearance:
             return None
-        return LinkPair(*self._clearance[condition.signal].links[row].tolist())
+        first, second = (int(number) for number in self._clearance[condition.signal].links[row])
+        cell = self._cell
+        name = "" if cell is None or second > OBSTACLE else cell.obstacles[OBSTACLE - second].name
+        return LinkPair(first, second, name)
 
     def _throughout(self, condition: Condition) -> Array:
         if condition.is_clearance:
@@ -167,18 +175,16 @@ class MotionSignals:
 
     @cached_property
     def _clearance(self) -> dict[str, ClearancePath]:
-        """The smallest distance between links, and from the floor, by signal."""
-        from rcilab.model.kinematics.collision import ClearanceQuery
-
+        """The smallest distance between links, from the floor, and from obstacles, by signal."""
         assert self._distance is not None
-        geometry = self._model.collision_geometry(self._distance)
-        query, path = ClearanceQuery(geometry), self._differences[0]
-        queries = {"link_distance": query.links, "floor_distance": query.floor}
+        query, levers = build_query(self._model, self._distance, self._cell)
+        path = self._differences[0]
+        queries = {"link_distance": query.links, "floor_distance": query.floor, "cell_distance": query.cell}
         bounds: dict[str, list[float]] = {}
-        for row in clearance_conditions(self._distance):
+        for row in clearance_conditions(self._distance, has_obstacles=has_obstacles(self._cell)):
             bounds.setdefault(row.signal, []).append(float(row.bounds(self._model.limits)[0][0]))
         return {
-            signal: clearance_path(queries[signal], path, self._start.q, geometry.levers, minima)
+            signal: clearance_path(queries[signal], path, self._start.q, levers, minima)
             for signal, minima in bounds.items()
         }
 

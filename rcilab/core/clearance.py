@@ -17,7 +17,7 @@ ADVISED_DISTANCE = 0.02  # [m]
 class ClearanceLimit:
     """Minimum distances of the capsules around the links from each other and from the floor.
 
-    A motion with a distance of `links` or `floor` or less is refused; one with `advised` or less gets a
+    A motion with a distance of `links`, `floor` or `cell` or less is refused; one with `advised` or less gets a
     recommendation. The floor is a horizontal plane under the whole arm. The base is mounted on it and is not checked.
 
     Raises:
@@ -28,8 +28,10 @@ class ClearanceLimit:
     """Between any two links that are not neighbours, [m]; at 0 they must not touch."""
     floor: float = 0.0
     """Between a link that moves up or down and the floor, [m]."""
+    cell: float = 0.0
+    """Between the arm, with what it carries, and the obstacles of a cell, [m]."""
     advised: float = ADVISED_DISTANCE
-    """Recommended distance for both, [m]."""
+    """Recommended distance for all of them, [m]."""
     floor_height: float | None = 0.0
     """Height of the floor in the base frame, [m]; None without a floor, as under a ceiling."""
     tool_radius: float | None = None
@@ -37,7 +39,7 @@ class ClearanceLimit:
 
     def __post_init__(self) -> None:
         """Checks the values."""
-        for name in ("links", "floor", "advised", "floor_height", "tool_radius"):
+        for name in ("links", "floor", "cell", "advised", "floor_height", "tool_radius"):
             value = getattr(self, name)
             if value is None and name in ("floor_height", "tool_radius"):
                 continue
@@ -56,18 +58,24 @@ FLOOR = -1
 """Link number of the floor."""
 TOOL = -2
 """Link number of the tool."""
+PART = -3
+"""Link number of the part that the tool holds."""
+OBSTACLE = -10
+"""Link number of the first obstacle of a cell; the next ones have -11, -12, ..."""
 
 
 class LinkPair(NamedTuple):
-    """The two links of a distance: 0 is the base, n the last link; also `TOOL` and `FLOOR`."""
+    """The two links of a distance: 0 is the base, n the last link; also `TOOL`, `PART`, `FLOOR` and obstacles."""
 
     first: int
     second: int
+    obstacle: str = ""
+    """Name of the second if it is an obstacle."""
 
     def __str__(self) -> str:
-        return f"{link_name(self.first)} and {link_name(self.second)}"
+        return f"{link_name(self.first)} and {self.obstacle or link_name(self.second)}"
 
 
 def link_name(number: int) -> str:
     """Returns the name of a link by its number; see `LinkPair`."""
-    return {FLOOR: "floor", TOOL: "tool", 0: "base"}.get(number, f"link {number}")
+    return {FLOOR: "floor", TOOL: "tool", PART: "part", 0: "base"}.get(number, f"link {number}")

@@ -28,6 +28,7 @@ Signal: TypeAlias = Literal[
     "frame",
     "link_distance",
     "floor_distance",
+    "cell_distance",
     "elbow_sign",
     "external_torque",
     "external_force",
@@ -35,8 +36,8 @@ Signal: TypeAlias = Literal[
 ]
 """The quantity of a condition: every joint's angle, its step from one command to the next, or its torque; the tool's
 position, the norms of its translation and rotation; the arm angle; the tool's pose as a whole; the smallest distance
-between links, or from the floor; the sign of the elbow angle; external torques and force; commands that did not
-arrive."""
+between links, from the floor, or from the obstacles of a cell; the sign of the elbow angle; external torques and force;
+commands that did not arrive."""
 
 Bounds: TypeAlias = tuple[Array, Array]
 """Lower and upper bound, each of shape (n,) for joints and (1,) for anything else."""
@@ -49,6 +50,7 @@ _LOCATIONS: dict[Signal, str] = {
     "elbow_sign": "elbow",
     "link_distance": "links",
     "floor_distance": "links",
+    "cell_distance": "links",
     "lost_commands": "network",
 }
 """Part of the arm that a signal belongs to; any other signal belongs to the tool."""
@@ -97,7 +99,7 @@ class Condition:
     @property
     def is_clearance(self) -> bool:
         """Whether it bounds distances, which only rcilab checks and no controller."""
-        return self.signal in ("link_distance", "floor_distance")
+        return self.signal in ("link_distance", "floor_distance", "cell_distance")
 
     @property
     def is_per_joint(self) -> bool:

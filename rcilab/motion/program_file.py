@@ -9,9 +9,10 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from rcilab.core.arrays import Unquoted, described
+from rcilab.core.arrays import described
 from rcilab.core.atomic_file import read_limited, replacing
-from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchError, plain_text
+from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchError
+from rcilab.motion.json_fields import excerpt, located, place, read_number, read_object, read_text, read_vector
 from rcilab.motion.located_json import LongListError, Node, read_json, require_length
 from rcilab.motion.waypoint import ALLOWED, CHOICES, COMMON_FIELDS, MOST_WAYPOINTS, Waypoint, require_count, require_fit
 from rcilab.robots import RobotDescription, describe_robot
@@ -24,7 +25,6 @@ P = TypeVar("P")
 FORMAT = "rcilab program"
 VERSION = 1
 
-_EXCERPT_LENGTH = 40  # [characters] Of a value in an error message.
 _SCALARS = ("angle", "psi", "speed", "blend", "dwell")
 _PROGRAM_KEYS = ("format", "version", "name", "model", "tool", "payload", "box", "start", "waypoints")
 
@@ -93,9 +93,9 @@ def read_program(content: bytes, name: str, build: Callable[..., P]) -> P:
         try:
             require_count(too_long.count)
         except InvalidValueError as error:
-            raise _with_line(error, name, Node([], too_long.line)) from error
+            raise located(error, name, Node([], too_long.line)) from error
         raise
-    found = _object(root, name, "a program", _PROGRAM_KEYS)
+    found = read_object(root, name, "a program", _PROGRAM_KEYS)
     for key, expected in (("format", FORMAT), ("version", float(VERSION))):
         if key not in found:
             raise InvalidValueError(
@@ -107,117 +107,62 @@ def read_program(content: bytes, name: str, build: Callable[..., P]) -> P:
             advice = "the rcilab that wrote it reads it; a program written by hand has version 1"
             raise VersionMismatchError(what, _as_json_number(value), VERSION, advice)
         if value != expected:
-            raise InvalidValueError(
-                _location(name, found[key], key), found[key].plain(), f"must be {expected!r}"
-            ).coded("file_no_program", file=name, line=found[key].line)
+            raise InvalidValueError(place(name, found[key], key), found[key].plain(), f"must be {expected!r}").coded(
+                "file_no_program", file=name, line=found[key].line
+            )
     for key in ("model", "start", "waypoints"):
         if key not in found:
             raise InvalidValueError(
                 f"{name}, {key}", None, "is missing; a program has model, start and waypoints"
             ).coded("file_missing", file=name, key=key)
-    texts = {key: _text(name, found[key], key) for key in ("name", "model") if key in found}
-    vectors = {key: _vector(name, found[key], key) for key in ("start", "tool", "payload", "box") if key in found}
+    texts = {key: read_text(name, found[key], key) for key in ("name", "model") if key in found}
+    vectors = {key: read_vector(name, found[key], key) for key in ("start", "tool", "payload", "box") if key in found}
     waypoint_list = found["waypoints"]
     if not isinstance(waypoint_list.value, list):
         raise InvalidValueError(
-            _location(name, waypoint_list, "waypoints"), waypoint_list.plain(), "must be a list [{...}, {...}]"
+            place(name, waypoint_list, "waypoints"), waypoint_list.plain(), "must be a list [{...}, {...}]"
         ).coded("file_kind", file=name, line=waypoint_list.line, key="waypoints")
     try:
         robot = describe_robot(str(texts["model"]))
     except ModelError as error:
         raise InvalidValueError(
-            _location(name, found["model"], "model"), texts["model"], f"is not a known model: {error}"
-        ).coded("file_model", file=name, line=found["model"].line, model=_excerpt(texts["model"])) from error
+            place(name, found["model"], "model"), texts["model"], f"is not a known model: {error}"
+        ).coded("file_model", file=name, line=found["model"].line, model=excerpt(texts["model"])) from error
     try:
         require_count(len(waypoint_list.value))
     except InvalidValueError as error:
-        raise _with_line(error, name, waypoint_list) from error
+        raise located(error, name, waypoint_list) from error
     waypoints = tuple(_waypoint(node, number, name, robot) for number, node in enumerate(waypoint_list.value, 1))
     try:
         return build(waypoints=waypoints, **texts, **vectors)
     except InvalidValueError as error:
         key = "tool" if error.name == "wxyz" else error.name.split()[0]  # "box wxyz" is about "box".
-        raise _with_line(error, name, found.get(key, root)) from error
+        raise located(error, name, found.get(key, root)) from error
 
 
 def _waypoint(node: Node, number: int, name: str, robot: RobotDescription) -> Waypoint:
     kind = f"waypoint {number}"
     keys = tuple(field.name for field in fields(Waypoint))
-    found = _object(node, name, kind, keys)
+    found = read_object(node, name, kind, keys)
     if "type" not in found:
         raise InvalidValueError(
             f"{name}, line {node.line}, {kind}, type", None, f"is missing; known: {', '.join(ALLOWED)}"
         ).coded("file_missing_of", file=name, line=node.line, number=number, key="type")
-    values: dict[str, Any] = {"type": _text(name, found["type"], f"{kind}, type")}
+    values: dict[str, Any] = {"type": read_text(name, found["type"], f"{kind}, type")}
     for key, value in found.items():
         if key == "type" or (value.value is None and key not in COMMON_FIELDS):
             continue
         what = f"{kind}, {key}"
-        read = _number if key in _SCALARS else _text if key in CHOICES else _vector
+        read = read_number if key in _SCALARS else read_text if key in CHOICES else read_vector
         values[key] = read(name, value, what)
     try:
         waypoint = Waypoint(**values)
         require_fit(waypoint, robot)
         return waypoint
     except InvalidValueError as error:
-        raise _with_line(
+        raise located(
             error, name, found.get(error.name, node), f"waypoint {number} ({values['type']}), ", number
         ) from error
-
-
-def _with_line(error: InvalidValueError, name: str, node: Node, prefix: str = "", number: int = 0) -> InvalidValueError:
-    value = Unquoted("nothing") if error.value is None else error.value
-    placed = InvalidValueError(f"{name}, line {node.line}, {prefix}{error.name}", value, error.requirement)
-    reason = error if error.code else error.requirement
-    facts: dict[str, object] = {"file": name, "line": node.line, "key": error.name, "value": _excerpt(error.value)}
-    if number:
-        return placed.coded("file_waypoint", number=number, reason=reason, **facts)
-    return placed.coded("file_value", reason=reason, **facts)
-
-
-def _excerpt(value: object) -> str:
-    return plain_text("" if value is None else str(value), _EXCERPT_LENGTH)
-
-
-def _object(node: Node, name: str, kind: str, keys: tuple[str, ...]) -> dict[str, Node]:
-    if not isinstance(node.value, dict):
-        raise InvalidValueError(f"{name}, line {node.line}", node.plain(), f"must be {kind}: an object {{...}}").coded(
-            "file_no_program", file=name, line=node.line
-        )
-    for key, value in node.value.items():
-        if key not in keys:
-            raise InvalidValueError(
-                f"{name}, line {value.line}, {kind}, {key}", value.plain(), f"is unknown; known: {', '.join(keys)}"
-            ).coded("file_unknown", file=name, line=value.line, key=_excerpt(key))
-    return node.value
-
-
-def _text(name: str, node: Node, key: str) -> str:
-    if not isinstance(node.value, str):
-        raise InvalidValueError(_location(name, node, key), node.plain(), "must be text in double quotes").coded(
-            "file_kind", file=name, line=node.line, key=key
-        )
-    return node.value
-
-
-def _number(name: str, node: Node, key: str) -> float:
-    if not isinstance(node.value, float):
-        raise InvalidValueError(_location(name, node, key), node.plain(), "must be a number").coded(
-            "file_kind", file=name, line=node.line, key=key
-        )
-    return node.value
-
-
-def _vector(name: str, node: Node, key: str) -> tuple[float, ...]:
-    if not isinstance(node.value, list):
-        raise InvalidValueError(_location(name, node, key), node.plain(), "must be a list of numbers [...]").coded(
-            "file_kind", file=name, line=node.line, key=key
-        )
-    return tuple(_number(name, item, f"{key}, number {i}") for i, item in enumerate(node.value, 1))
-
-
-def _location(name: str, node: Node, key: str) -> str:
-    return f"{name}, line {node.line}, {key}"
 
 
 def _as_json_number(value: object) -> object:

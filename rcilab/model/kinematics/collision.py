@@ -23,7 +23,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rcilab.core.arrays import Array, JointPath, JointVector, Vector3, readonly_copy
-from rcilab.core.clearance import FLOOR, TOOL, LinkPair
+from rcilab.core.clearance import FLOOR, OBSTACLE, TOOL, LinkPair
 from rcilab.robots.description import MountedTool, RobotDescription
 from rcilab.robots.shapes import Capsule, build_shapes, tool_capsules
 from rcilab.robots.upright import upright_flange, upright_joints
@@ -74,7 +74,7 @@ class CollisionGeometry:
         self.floor, self.floor_pairs = self._compare(
             [LinkPair(name, FLOOR) for name in moving_vertically], floor_height
         )
-        self.levers = readonly_copy(_levers(description, self.bodies))
+        self.levers = readonly_copy(compute_levers(description, self.bodies))
         """Largest distance of any point of the arm from each joint's axis, shape (n,), [m]."""
 
     def _compare(self, pairs: list[LinkPair], floor_height: float | None) -> tuple[Any, list[LinkPair]]:
@@ -83,7 +83,7 @@ class CollisionGeometry:
         last = self.tree.njoints - 1
         solids = {
             number if number <= last else TOOL: [
-                geometry.addGeometryObject(_solid(capsule, min(number, last))) for capsule in capsules
+                geometry.addGeometryObject(capsule_solid(capsule, min(number, last))) for capsule in capsules
             ]
             for number, capsules in enumerate(self.bodies)
         }
@@ -121,11 +121,17 @@ class ClearanceQuery:
             return float("inf"), LinkPair(self._geometry.tree.njoints - 1, FLOOR)
         return self._nearest(self._geometry.floor, self._floor, self._geometry.floor_pairs, q)
 
+    def cell(self, q: JointVector) -> tuple[float, LinkPair]:
+        """Returns an infinite distance: an arm alone has no obstacles."""
+        del q
+        return float("inf"), LinkPair(self._geometry.tree.njoints - 1, OBSTACLE)
+
     def path(self, q: JointPath) -> Clearance:
         """Returns the smaller of both distances for every row of q, shape (N, n), [rad]."""
         distance, links = np.empty(len(q)), np.empty((len(q), 2), dtype=np.intp)
         for row, angles in enumerate(q):
-            distance[row], links[row] = min(self.links(angles), self.floor(angles))
+            distance[row], pair = min(self.links(angles), self.floor(angles))
+            links[row] = pair[:2]
         return Clearance(distance, links)
 
     def _nearest(self, geometry: Any, data: Any, pairs: list[LinkPair], q: JointVector) -> tuple[float, LinkPair]:
@@ -172,7 +178,7 @@ def _joint_type(axis: Vector3) -> Any:
     return pin.JointModelRY() if axis[1] > _AXIS_THRESHOLD else pin.JointModelRevoluteUnaligned(axis.copy())
 
 
-def _solid(capsule: Capsule, link: int) -> Any:
+def capsule_solid(capsule: Capsule, link: int) -> Any:
     """Returns a capsule for pinocchio, fixed to a link; that of the tool belongs to the last link."""
     line = capsule.end - capsule.start
     length = float(np.linalg.norm(line))
@@ -187,8 +193,12 @@ def _first_moving_vertically(description: RobotDescription) -> int:
     return next(number for number, axis in enumerate(axes, start=1) if abs(axis[2]) < _AXIS_THRESHOLD)
 
 
-def _levers(description: RobotDescription, bodies: Sequence[Sequence[Capsule]]) -> list[float]:
+def compute_levers(description: RobotDescription, bodies: Sequence[Sequence[Capsule]]) -> list[float]:
     """Returns the largest distance of the following links from each joint's axis, for any angles of later joints, [m].
+
+    Args:
+        description: The arm.
+        bodies: Capsules of base and links, in their frames; more of them belong to the last link.
 
     Computed link by link from the flange. The following links are represented by horizontal rings: centre in the link's
     frame, radius and thickness. A z joint rotates a ring about its axis; any other joint sweeps it into a ball.

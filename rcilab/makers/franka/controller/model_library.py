@@ -8,7 +8,6 @@ the tables of the arm, and kept in the user's cache folder under a name made of 
 from __future__ import annotations
 
 import hashlib
-import os
 import platform
 import shutil
 import subprocess
@@ -22,6 +21,7 @@ import numpy as np
 
 from rcilab.core.arrays import Array
 from rcilab.core.atomic_file import replacing
+from rcilab.core.cache_folder import cache_folder
 from rcilab.core.errors import ModelError
 from rcilab.makers.franka.controller.craig_bodies import craig_bodies, craig_placement
 from rcilab.makers.franka.robots.arm import CRAIG
@@ -50,7 +50,7 @@ def build_model_library(description: RobotDescription, cache: Path | None = None
         ModelError: There is no compiler, or it failed; the message has the remedy.
     """
     source = library_source(description)
-    folder = _cache_folder() if cache is None else cache
+    folder = cache_folder() if cache is None else cache
     key = hashlib.sha256("\0".join((platform.machine(), *_OPTIONS, source)).encode()).hexdigest()
     file = folder / f"franka-model-{key[:32]}.so"
     try:
@@ -123,8 +123,3 @@ def _compile(source: str) -> bytes:
         first = next(iter(lines), "no message, and no library")
         raise ModelError(f"the model library of version 5 was not compiled by {compiler}: {first}")
     return library
-
-
-def _cache_folder() -> Path:
-    named = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(named) if os.path.isabs(named) else Path.home() / ".cache") / "rcilab"

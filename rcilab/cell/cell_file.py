@@ -1,0 +1,374 @@
+"""Cells as JSON: one entry a line, errors that name the line. Schema: cell.schema.json."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from os import PathLike, fspath, path
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from rcilab.cell.entries import WORLD, Frame, Obstacle, Signal
+from rcilab.cell.mesh_file import load_mesh
+from rcilab.cell.shapes import SHAPES, MeshShape, Plane, Shape, Solid, shape_name
+from rcilab.cell.tool import Jaws, Part, Tool
+from rcilab.core.arrays import described
+from rcilab.core.atomic_file import read_limited, replacing
+from rcilab.core.errors import InvalidValueError, VersionMismatchError
+from rcilab.core.spatial import IDENTITY, Pose
+from rcilab.model.dynamics.payload import Payload
+from rcilab.motion.json_fields import (
+    located,
+    place,
+    read_list,
+    read_number,
+    read_object,
+    read_text,
+    read_vector,
+)
+from rcilab.motion.located_json import Node, read_json, require_length
+
+if TYPE_CHECKING:
+    from rcilab.cell.cell import Cell
+
+T = TypeVar("T")
+
+FORMAT = "rcilab cell"
+VERSION = 1
+_DIGITS = 12  # After the point, of lengths and quaternions.
+
+_KEYS = (
+    "format", "version", "name", "model", "base", "floor", "tool", "obstacles", "frames", "workpiece", "parts", "held",
+    "signals",
+)  # fmt: skip
+_POSE = ("position", "wxyz")
+_MASS = ("mass", "center_of_mass", "inertia")
+_SHAPE = ("shape", "size", "radius", "length", "file", "scale")
+_OF_SHAPE = {
+    "box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",), "plane": (), "mesh": ("file", "scale"),
+}  # fmt: skip
+
+
+def cell_text(cell: Cell, folder: Path) -> str:
+    """Returns a cell as JSON.
+
+    Args:
+        cell: The cell.
+        folder: Where the file will be; names of meshes are relative to it.
+
+    Raises:
+        InvalidValueError: A mesh was not read from a file.
+    """
+    lines = [f'"format": "{FORMAT}"', f'"version": {VERSION}']
+    for key, value in (("name", cell.name), ("model", cell.model)):
+        if value:
+            lines.append(f"{json.dumps(key)}: {_text(value)}")
+    if cell.T_world_base is not IDENTITY:
+        lines.append(f'"base": {_text(_pose(cell.T_world_base))}')
+    lines.append(f'"floor": {_text(cell.floor)}')
+    if cell.tool is not None:
+        lines.append(f'"tool": {_text(_tool(cell.tool, folder))}')
+    lists: tuple[tuple[str, list[dict[str, Any]]], ...] = (
+        ("frames", [_frame(frame) for frame in cell.frames]),
+        ("obstacles", [_obstacle(obstacle, folder) for obstacle in cell.obstacles]),
+        ("parts", [_part(part, folder) for part in cell.parts]),
+        ("signals", [{"name": s.name, "kind": s.kind, "channel": s.channel} for s in cell.signals]),
+    )
+    for key, entries in lists:
+        if entries:
+            rows = ",\n".join(f"    {_text(entry)}" for entry in entries)
+            lines.append(f'"{key}": [\n{rows}\n  ]')
+    for key, value in (("workpiece", cell.workpiece), ("held", cell.held)):
+        if value:
+            lines.append(f"{json.dumps(key)}: {_text(value)}")
+    return "{\n" + ",\n".join(f"  {line}" for line in lines) + "\n}\n"
+
+
+def save_cell(cell: Cell, file: str | PathLike[str]) -> None:
+    """Writes a cell as JSON.
+
+    Raises:
+        InvalidValueError: The name does not end in .json, the file cannot be written, or a mesh has no file.
+    """
+    target = _as_path(file)
+    if target.suffix.lower() != ".json":
+        raise InvalidValueError("cell file", str(target), "must end in .json")
+    text = cell_text(cell, target.parent)
+    try:
+        with replacing(target) as stream:
+            stream.write(text.encode())
+    except OSError as error:
+        raise InvalidValueError("cell file", str(target), f"cannot be written: {error.strerror}").coded(
+            "file_unwritable", file=str(target)
+        ) from error
+
+
+def load_cell(file: str | PathLike[str], build: Callable[..., T]) -> T:
+    """Returns the cell in a file; arguments as of `read_cell`.
+
+    Raises:
+        InvalidValueError: The file does not exist, or its cell is not valid; the message names the line.
+        VersionMismatchError: It has another version of this format.
+    """
+    source = _as_path(file)
+    content = read_limited(source, "cell file", lambda size: require_length(size, source.name))
+    return read_cell(content, source.name, source.parent, build)
+
+
+def read_cell(content: bytes, name: str, folder: Path, build: Callable[..., T]) -> T:
+    """Returns the cell in a JSON text, built by `build` with the keyword arguments of `Cell`.
+
+    Args:
+        content: JSON in UTF-8.
+        name: Name of the text, for errors.
+        folder: Folder that names of meshes are relative to.
+        build: Builds the cell; raises InvalidValueError for an invalid value.
+
+    Raises:
+        InvalidValueError: The cell is not valid; the message names line, key, value, bound and remedy.
+        VersionMismatchError: It has another version of this format.
+    """
+    return _Reader(name, folder).read(read_json(content, name), build)
+
+
+class _Reader:
+    """Builds one cell from its JSON. Owned by one call of `read_cell`."""
+
+    def __init__(self, name: str, folder: Path) -> None:
+        self._name, self._folder = name, folder
+
+    def read(self, root: Node, build: Callable[..., T]) -> T:
+        found = read_object(root, self._name, "a cell", _KEYS)
+        for key in ("format", "version", "model"):
+            if key not in found:
+                raise InvalidValueError(
+                    f"{self._name}, {key}", None, f'is missing; a cell begins with "format": "{FORMAT}", "version": 1'
+                ).coded("file_missing", file=self._name, key=key)
+        if found["format"].value != FORMAT:
+            raise InvalidValueError(
+                place(self._name, found["format"], "format"), found["format"].plain(), f"must be {FORMAT!r}"
+            )
+        if found["version"].value != float(VERSION):
+            what = place(self._name, found["version"], "version")
+            raise VersionMismatchError(what, found["version"].plain(), VERSION, "the rcilab that wrote it reads it")
+        values: dict[str, Any] = {
+            key: read_text(self._name, found[key], key)
+            for key in ("model", "name", "workpiece", "held")
+            if key in found
+        }
+        if "base" in found:
+            entries = read_object(found["base"], self._name, "base", _POSE)
+            values["T_world_base"] = self._pose(entries, "base")
+        if "floor" in found:
+            is_open = found["floor"].value is None
+            values["floor"] = None if is_open else read_number(self._name, found["floor"], "floor")
+        if "tool" in found:
+            values["tool"] = self._tool(found["tool"])
+        lists: dict[str, Callable[[Node, str], Any]] = {
+            "frames": self._frame,
+            "obstacles": self._obstacle,
+            "parts": self._part,
+            "signals": self._signal,
+        }
+        for key, read in lists.items():
+            if key in found:
+                nodes = read_list(self._name, found[key], key)
+                values[key] = tuple(read(node, f"{key}, entry {i}") for i, node in enumerate(nodes, 1))
+        return self._build(lambda: build(**values), root, found, "")
+
+    def _build(self, build: Callable[[], T], node: Node, found: dict[str, Node], what: str) -> T:
+        """Returns what a constructor builds; its error gets the line of the value."""
+        try:
+            return build()
+        except InvalidValueError as error:
+            prefix = f"{what}, " if what else ""
+            raise located(error, self._name, found.get(error.name.split()[0], node), prefix) from error
+
+    def _frame(self, node: Node, what: str) -> Frame:
+        found = read_object(node, self._name, what, ("name", "parent", *_POSE))
+        texts = self._texts(found, what, ("name", "parent"))
+        pose = self._pose(found, what)
+        return self._build(lambda: Frame(T_parent_frame=pose, **texts), node, found, what)
+
+    def _obstacle(self, node: Node, what: str) -> Obstacle:
+        found = read_object(node, self._name, what, ("name", "frame", "may_touch", *_SHAPE, *_POSE))
+        values: dict[str, Any] = self._texts(found, what, ("name", "frame"))
+        if "may_touch" in found:
+            touched = read_list(self._name, found["may_touch"], f"{what}, may_touch")
+            values["may_touch"] = tuple(read_text(self._name, one, f"{what}, may_touch") for one in touched)
+        values |= {"shape": self._shape(node, found, what), "pose": self._pose(found, what)}
+        return self._build(lambda: Obstacle(**values), node, found, what)
+
+    def _signal(self, node: Node, what: str) -> Signal:
+        found = read_object(node, self._name, what, ("name", "kind", "channel"))
+        values: dict[str, Any] = self._texts(found, what, ("name", "kind"))
+        if "channel" not in found:
+            raise self._missing(node, what, "channel")
+        values["channel"] = read_number(self._name, found["channel"], f"{what}, channel")
+        return self._build(lambda: Signal(**values), node, found, what)
+
+    def _part(self, node: Node, what: str) -> Part:
+        found = read_object(node, self._name, what, ("name", "held_at", "solids", *_MASS))
+        values: dict[str, Any] = self._texts(found, what, ("name",)) | self._carried(node, found, what)
+        if "held_at" in found:
+            entries = read_object(found["held_at"], self._name, f"{what}, held_at", _POSE)
+            values["T_tool_part"] = self._pose(entries, what)
+        return self._build(lambda: Part(**values), node, found, what)
+
+    def _tool(self, node: Node) -> Tool:
+        found = read_object(node, self._name, "tool", ("name", "tcp", "solids", "jaws", *_MASS))
+        values: dict[str, Any] = self._texts(found, "tool", ("name",), ()) | self._carried(node, found, "tool")
+        if "tcp" in found:
+            entries = read_object(found["tcp"], self._name, "tool, tcp", _POSE)
+            values["T_flange_tool"] = self._pose(entries, "tool")
+        if "jaws" in found:
+            values["jaws"] = self._jaws(found["jaws"])
+        return self._build(lambda: Tool(**values), node, found, "tool")
+
+    def _jaws(self, node: Node) -> Jaws:
+        found = read_object(node, self._name, "jaws", ("open", "closed", "finger"))
+        if "open" not in found:
+            raise self._missing(node, "jaws", "open")
+        values: dict[str, Any] = {
+            key: read_number(self._name, found[key], f"jaws, {key}") for key in ("open", "closed") if key in found
+        }
+        if "finger" in found:
+            values["finger"] = self._solids(found["finger"], "finger")
+        return self._build(lambda: Jaws(**values), node, found, "jaws")
+
+    def _carried(self, node: Node, found: dict[str, Node], what: str) -> dict[str, Any]:
+        values: dict[str, Any] = {}
+        mass: dict[str, Any] = {}
+        if "mass" in found:
+            mass["mass"] = read_number(self._name, found["mass"], f"{what}, mass")
+        for key in ("center_of_mass", "inertia"):
+            if key in found:
+                mass[key] = read_vector(self._name, found[key], f"{what}, {key}")
+        if mass:
+            values["payload"] = self._build(lambda: Payload(**mass), node, found, what)
+        if "solids" in found:
+            values["solids"] = self._solids(found["solids"], f"{what}, solids")
+        return values
+
+    def _solids(self, node: Node, what: str) -> tuple[Solid, ...]:
+        solids: list[Solid] = []
+        for number, entry in enumerate(read_list(self._name, node, what), 1):
+            name = f"{what} {number}"
+            found = read_object(entry, self._name, name, (*_SHAPE, *_POSE))
+            solids.append(Solid(shape=self._shape(entry, found, name), pose=self._pose(found, name)))
+        return tuple(solids)
+
+    def _shape(self, node: Node, found: dict[str, Node], what: str) -> Shape:
+        if "shape" not in found:
+            raise self._missing(node, what, "shape")
+        kind = read_text(self._name, found["shape"], f"{what}, shape")
+        if kind not in SHAPES:
+            raise InvalidValueError(
+                place(self._name, found["shape"], f"{what}, shape"), kind, f"is unknown; known: {', '.join(SHAPES)}"
+            )
+        for key in _SHAPE[1:]:
+            if key in found and key not in _OF_SHAPE[kind]:
+                problem = f"has no meaning for a {kind}; it takes: {', '.join(_OF_SHAPE[kind]) or 'nothing'}"
+                raise InvalidValueError(place(self._name, found[key], f"{what}, {key}"), found[key].plain(), problem)
+        for key in _OF_SHAPE[kind]:
+            if key not in found and key != "scale":
+                raise self._missing(node, what, key)
+        if kind == "plane":
+            return Plane()
+        if kind == "mesh":
+            scale = read_number(self._name, found["scale"], f"{what}, scale") if "scale" in found else 1.0
+            file = read_text(self._name, found["file"], f"{what}, file")
+            return self._build(lambda: load_mesh(self._folder / file, scale=scale), node, found, what)
+        values: dict[str, Any] = {
+            key: (read_vector if key == "size" else read_number)(self._name, found[key], f"{what}, {key}")
+            for key in _OF_SHAPE[kind]
+        }
+        return self._build(lambda: SHAPES[kind](**values), node, found, what)
+
+    def _pose(self, found: dict[str, Node], what: str) -> Pose:
+        numbers = [
+            read_vector(self._name, found[key], f"{what}, {key}") if key in found else default
+            for key, default in zip(_POSE, ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)), strict=True)
+        ]
+        node = next((found[key] for key in _POSE if key in found), Node(None, 1))
+        return self._build(lambda: Pose(*numbers), node, found, what)
+
+    def _texts(
+        self, found: dict[str, Node], what: str, keys: Sequence[str], required: Sequence[str] = ("name",)
+    ) -> dict[str, Any]:
+        for key in required:
+            if key not in found:
+                raise self._missing(next(iter(found.values()), Node(None, 1)), what, key)
+        return {key: read_text(self._name, found[key], f"{what}, {key}") for key in keys if key in found}
+
+    def _missing(self, node: Node, what: str, key: str) -> InvalidValueError:
+        return InvalidValueError(place(self._name, node, f"{what}, {key}"), None, "is missing").coded(
+            "file_missing", file=self._name, key=key
+        )
+
+
+def _text(value: object) -> str:
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _pose(pose: Pose) -> dict[str, Any]:
+    position, wxyz = ([round(x, _DIGITS) + 0.0 for x in part.tolist()] for part in (pose.position, pose.wxyz))
+    found: dict[str, Any] = {"position": position}
+    if wxyz != [1.0, 0.0, 0.0, 0.0]:
+        found["wxyz"] = wxyz
+    return found
+
+
+def _shape(shape: Shape, folder: Path) -> dict[str, Any]:
+    kind = shape_name(shape)
+    if isinstance(shape, MeshShape):
+        if not shape.file:
+            raise InvalidValueError("mesh", repr(shape), "was not read from a file; save it as STL first")
+        found: dict[str, Any] = {"shape": kind, "file": path.relpath(shape.file, folder)}
+        return found | ({"scale": shape.scale} if shape.scale != 1.0 else {})
+    values = {key: getattr(shape, key) for key in _OF_SHAPE[kind]}
+    return {"shape": kind} | {key: list(v) if isinstance(v, tuple) else v for key, v in values.items()}
+
+
+def _solids(solids: Sequence[Solid], folder: Path) -> list[dict[str, Any]]:
+    return [_shape(solid.shape, folder) | _pose(solid.pose) for solid in solids]
+
+
+def _mass(payload: Payload) -> dict[str, Any]:
+    if not payload.mass:
+        return {}
+    found: dict[str, Any] = {"mass": payload.mass, "center_of_mass": payload.center_of_mass.tolist()}
+    return found | ({"inertia": payload.inertia.ravel().tolist()} if payload.inertia.any() else {})
+
+
+def _tool(tool: Tool, folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = {"name": tool.name, "tcp": _pose(tool.T_flange_tool), **_mass(tool.payload)}
+    if tool.solids:
+        found["solids"] = _solids(tool.solids, folder)
+    if tool.jaws is not None:
+        jaws: dict[str, Any] = {"open": tool.jaws.open, "closed": tool.jaws.closed}
+        found["jaws"] = jaws | ({"finger": _solids(tool.jaws.finger, folder)} if tool.jaws.finger else {})
+    return found
+
+
+def _part(part: Part, folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = {"name": part.name, **_mass(part.payload), "held_at": _pose(part.T_tool_part)}
+    return found | ({"solids": _solids(part.solids, folder)} if part.solids else {})
+
+
+def _frame(frame: Frame) -> dict[str, Any]:
+    parent = {} if frame.parent == WORLD else {"parent": frame.parent}
+    return {"name": frame.name, **parent, **_pose(frame.T_parent_frame)}
+
+
+def _obstacle(obstacle: Obstacle, folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = {"name": obstacle.name} | _shape(obstacle.shape, folder) | _pose(obstacle.pose)
+    if obstacle.frame != WORLD:
+        found["frame"] = obstacle.frame
+    return found | ({"may_touch": list(obstacle.may_touch)} if obstacle.may_touch else {})
+
+
+def _as_path(file: object) -> Path:
+    if not isinstance(file, str | PathLike):
+        raise InvalidValueError("cell file", described(file), "must be a file name")
+    return Path(fspath(file))
