@@ -109,6 +109,11 @@ def can_slow_down_help(report: Report) -> bool:
     return ("necessary", 0) not in powers and any(power > 0 for _, power in powers)
 
 
+def is_met_when_slower(report: Report) -> bool:
+    """Returns whether every violated condition depends on the speed."""
+    return all(_power(row.condition) > 0 for row in _broken(report))
+
+
 class _Search:
     """One search, with the original report and the largest factor."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rcilab.app.check.report_rows import count_unheeded, row_facts, row_tone, row_word
+from rcilab.app.check.report_rows import passed_sentence, row_facts, row_tone, row_word
 from rcilab.conformance.explain import explain_formula, explain_source, explain_violation
 from rcilab.conformance.report import ConditionResult, Report
 from rcilab.notebook.part import Part
@@ -44,10 +44,8 @@ class ReportView(Part):
             )
             write(self._rows, "")
             return
-        unheeded = count_unheeded(report)
         if report.ok:
-            code = "check.passed_unheeded" if unheeded else "check.passed_long"
-            sentence = verdict("good", text("check.passed"), text(code, count=unheeded))
+            sentence = verdict("good", text("check.passed"), passed_sentence(report, text))
         else:
             failed = text("check.failed_long", conditions=report.violated_conditions, count=len(report.violations))
             sentence = verdict("bad", text("check.failed"), failed)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rcilab.app.check.check_actions import CheckActions, PressCheck, plot_of
-from rcilab.app.check.report_rows import row_facts, row_tone, row_word
+from rcilab.app.check.report_rows import passed_sentence, row_facts, row_tone, row_word
 from rcilab.app.check.slowdown_job import scaled, slow_to_goal
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import GoalActions
@@ -157,6 +157,16 @@ def test_where_a_lower_speed_does_it_the_plan_is_made_anew_with_that(bench: Benc
     assert broken(slower.plan) == set()
     assert can_slow_down_help(bench.plan.report)
     assert not can_slow_down_help(slower.plan.report)
+
+
+def test_a_slow_down_is_offered_only_where_it_meets_every_recommendation(bench: Bench) -> None:
+    assert "Slow down to fit" in passed_sentence(bench.plan.report, Text("en"))
+    arm = load_model("RM75")
+    near = check(plan_joint(arm, arm.home, np.radians([60.0, -30.0, 0.0, 70.0, 0.0, 90.0, 0.0]), speed=0.5), arm)
+    assert [row.id for row in near.rows if not row.ok] == ["clearance.links.advised"]
+    sentence = passed_sentence(near, Text("en"))
+    assert "Recommended ones exceeded, in amber: 1." in sentence
+    assert "Slow down" not in sentence
 
 
 def planned_program(bench: Bench) -> Draft:

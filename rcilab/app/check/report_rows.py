@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rcilab.conformance.explain import explain_place
+from rcilab.conformance.time_scaling import is_met_when_slower
 from rcilab.i18n.condition_values import value_against_bound, with_unit
 
 if TYPE_CHECKING:
@@ -18,6 +19,15 @@ TIGHT = 0.95  # Share of a bound from which on a row is amber.
 def count_unheeded(report: Report) -> int:
     """Returns how many recommended conditions are exceeded."""
     return sum(not row.ok for row in report.rows if row.necessity == "recommended")
+
+
+def passed_sentence(report: Report, text: Text) -> str:
+    """Returns what a report that passes says, and whether a slow-down meets the recommended conditions too."""
+    unheeded = count_unheeded(report)
+    if not unheeded:
+        return text("check.passed_long")
+    code = "check.passed_slower" if is_met_when_slower(report) else "check.passed_unheeded"
+    return text(code, count=unheeded)
 
 
 def row_tone(row: ConditionResult) -> Tone:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import beside_program, outdated
-from rcilab.app.check.report_rows import count_unheeded
+from rcilab.app.check.report_rows import passed_sentence
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import is_plan_current
 from rcilab.app.text import Text
@@ -94,14 +94,12 @@ class CheckPanel:
 
     def _headline(self, plan: Plan, changed: Message | None, aside: Message | None, *, is_current: bool) -> str:
         text, report = self._text, plan.report
-        unheeded = count_unheeded(report)
         if changed is not None:
             headline = ("warn", "▲ ", "check.outdated", text.render(changed))
         elif report.ok and not is_current:
             headline = ("warn", "▲ ", "check.unconnected", text("check.unconnected_long"))
         elif report.ok:
-            code = "check.passed_unheeded" if unheeded else "check.passed_long"
-            headline = ("good", "", "check.passed", text(code, count=unheeded))
+            headline = ("good", "", "check.passed", passed_sentence(report, text))
         else:
             made = "check.recorded" if plan.is_recorded else "check.failed"
             sentence = text(f"{made}_long", conditions=report.violated_conditions, count=len(report.violations))

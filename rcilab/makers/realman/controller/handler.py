@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 from rcilab.makers.realman.controller.realman_controller import RealManController
 from rcilab.makers.realman.wire.line import Request
 from rcilab.sim.channels import Peer
+
+MOTION_FIELD: Final = "receive_state"
+"""Of the answer to a motion command, whose end is an event."""
 
 Getter: TypeAlias = Callable[[RealManController, Request], Mapping[str, Any]]
 """Returns a whole answer."""

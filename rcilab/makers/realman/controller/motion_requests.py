@@ -15,7 +15,7 @@ from rcilab.core.limits import Limits
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Remark
 from rcilab.makers.realman.controller.arm_drive import find_outside
-from rcilab.makers.realman.controller.handler import Getter, Setter, setter
+from rcilab.makers.realman.controller.handler import MOTION_FIELD, Getter, Setter, setter
 from rcilab.makers.realman.controller.joint_parameters import require_joint
 from rcilab.makers.realman.controller.realman_controller import RealManController
 from rcilab.makers.realman.controller.trajectories import Trajectory, TrajectoryKind
@@ -338,15 +338,15 @@ def _teach_frame(controller: RealManController, request: Request) -> dict[str, A
 
 
 SETTERS: dict[str, Setter] = {
-    "movej": Setter("receive_state", _movej),
-    "movej_p": Setter("receive_state", _movej_p),
-    "movel": Setter("receive_state", _movel),
-    "movel_offset": Setter("receive_state", _movel_offset),
-    "movec": Setter("receive_state", _movec),
-    "moves": Setter("receive_state", _moves),
-    "set_joint_step": Setter("receive_state", _joint_step),
-    "set_pos_step": Setter("receive_state", _pos_step),
-    "set_ort_step": Setter("receive_state", _ort_step),
+    "movej": Setter(MOTION_FIELD, _movej),
+    "movej_p": Setter(MOTION_FIELD, _movej_p),
+    "movel": Setter(MOTION_FIELD, _movel),
+    "movel_offset": Setter(MOTION_FIELD, _movel_offset),
+    "movec": Setter(MOTION_FIELD, _movec),
+    "moves": Setter(MOTION_FIELD, _moves),
+    "set_joint_step": Setter(MOTION_FIELD, _joint_step),
+    "set_pos_step": Setter(MOTION_FIELD, _pos_step),
+    "set_ort_step": Setter(MOTION_FIELD, _ort_step),
     "set_joint_teach": setter("joint_teach", _joint_teach),
     "set_pos_teach": setter("pos_teach", _pos_teach),
     "set_ort_teach": setter("ort_teach", _ort_teach),

@@ -20,7 +20,7 @@ from rcilab.makers.realman.controller import (
     state_requests,
 )
 from rcilab.makers.realman.controller.flash import Flash, flash_file
-from rcilab.makers.realman.controller.handler import Getter, Setter
+from rcilab.makers.realman.controller.handler import MOTION_FIELD, Getter, Setter
 from rcilab.makers.realman.controller.identity import Generation, require_generation, software_info
 from rcilab.makers.realman.controller.push import encode_push
 from rcilab.makers.realman.controller.realman_controller import RealManController
@@ -33,6 +33,9 @@ from rcilab.sim.virtual_arm import VirtualArm
 
 _PROTOCOL = "RealMan's JSON protocol"
 _MOST_CLIENTS = 8
+_EVENT_DELAY = 10
+"""[cycles] The event of a motion comes no earlier behind its answer: a client in single-thread mode that receives both
+at once takes the answer only, and waits for the event until its time is over. rcilab's own value."""
 _PARTS = (
     joint_requests,
     state_requests,
@@ -79,6 +82,8 @@ class RealManServer:
         self._peers: list[Peer] = []
         self._pushed_to: tuple[Peer, int] | None = None
         self._files: dict[Peer, Request] = {}  # Announced, by client.
+        self._accepted: dict[Peer, int] = {}  # Cycle of the last accepted motion, by client.
+        self._events: list[tuple[int, Peer, Mapping[str, object]]] = []  # With the cycle in which each is sent.
         controller.on_end = self._report_end
         controller.on_log = self._log
 
@@ -87,7 +92,11 @@ class RealManServer:
         """Whether nothing moves and nothing is pushed."""
         controller = self.controller
         return not (
-            controller.is_moving or controller.program or controller.is_dragging or controller.settings.push.enable
+            controller.is_moving
+            or controller.program
+            or controller.is_dragging
+            or controller.settings.push.enable
+            or self._events
         )
 
     def attach(self, link: ClientLink) -> None:
@@ -103,6 +112,8 @@ class RealManServer:
         self._peers.remove(peer)
         self.controller.trajectories.forget(peer)
         self._files.pop(peer, None)
+        self._accepted.pop(peer, None)
+        self._events = [event for event in self._events if event[1] is not peer]
         if self._pushed_to is not None and self._pushed_to[0] is peer:
             self._pushed_to = None
         return False
@@ -146,6 +157,8 @@ class RealManServer:
         event = program_requests.advance_program(self.controller)
         if event is not None and running is not None and running.peer in self._peers:
             self._answer(running.peer, event)
+        if self._events:
+            self._send_events()
 
     def send_states(self) -> None:
         """Pushes the state when its period is over."""
@@ -174,6 +187,9 @@ class RealManServer:
             is_done = False
             text = f"{request.command} was refused: {error}"
             self._link.log("refused", text, request=request.command, status="REFUSED")
+        else:
+            if setter.field == MOTION_FIELD:
+                self._accepted[peer] = self.controller.cycle_number
         self._answer(peer, {"command": request.command, setter.field: is_done})
 
     def _get(self, peer: Peer, request: Request, getter: Getter) -> None:
@@ -215,7 +231,16 @@ class RealManServer:
                 "device": 0,
                 "trajectory_connect": int(continues or left > 0),
             }
-            self._answer(trajectory.peer, event)
+            due = self._accepted.get(trajectory.peer, 0) + _EVENT_DELAY
+            self._events.append((due, trajectory.peer, event))
+
+    def _send_events(self) -> None:
+        events, self._events = self._events, []
+        for due, peer, event in events:
+            if due <= self.controller.cycle_number:
+                self._answer(peer, event)
+            else:
+                self._events.append((due, peer, event))
 
     def _log(self, kind: str, text: str) -> None:
         self._link.log(kind, text)

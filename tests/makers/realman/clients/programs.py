@@ -74,6 +74,15 @@ def motions(robot: Any, n: int) -> dict[str, Any]:
     return found
 
 
+def ends_at_once(robot: Any, n: int) -> dict[str, Any]:
+    """Waits for motions that end as soon as they are accepted: to where the arm is, and beyond its reach."""
+    q, pose = robot.rm_get_joint_degree()[1][:n], robot.rm_get_current_arm_state()[1]["pose"]
+    return {
+        "reached": [robot.rm_movej(q, 50, 0, 0, 5) for _ in range(3)],
+        "refused": [robot.rm_movel([pose[0] + 3.0, *pose[1:]], 50, 0, 0, 5) for _ in range(3)],
+    }
+
+
 def signals(robot: Any, n: int) -> dict[str, Any]:
     """Sets ports of controller and tool, as the maker's example on them does, and reads them back."""
     return {
@@ -165,9 +174,14 @@ def main() -> None:
     robot = RoboticArm(rm_thread_mode_e(mode))
     handle = robot.rm_create_robot_arm(host, port, 3)
     info = robot.rm_get_robot_info()[1]
-    found = {"joint_commands": joint_commands, "motions": motions, "signals": signals, "program": program}[part](
-        robot, info["arm_dof"]
-    )
+    parts = {
+        "joint_commands": joint_commands,
+        "motions": motions,
+        "ends_at_once": ends_at_once,
+        "signals": signals,
+        "program": program,
+    }
+    found = parts[part](robot, info["arm_dof"])
     robot.rm_delete_robot_arm()
     print("FOUND", json.dumps({"id": handle.id, "info": info, **found}, default=str), flush=True)
 

@@ -85,6 +85,13 @@ def test_motions_end_where_they_should_and_refusals_are_seen(served: tuple[str, 
     assert found["stop"] == [0, 0, 0, 0]
 
 
+def test_a_client_in_single_thread_mode_waits_for_motions_that_end_at_once(served: tuple[str, Process], tmp_path: Path):
+    _, process = served
+    found = run(process, "single", "ends_at_once", tmp_path)
+    assert found["reached"] == [0, 0, 0]
+    assert found["refused"] == [1, 1, 1]
+
+
 def test_ports_and_voltages_are_read_back_as_they_were_set(served: tuple[str, Process], tmp_path: Path):
     _, process = served
     found = run(process, "triple", "signals", tmp_path)

@@ -173,6 +173,7 @@ def test_a_joint_that_moves_is_not_enabled_and_a_disabled_one_does_not_move():
     bench.run(100)
     assert bench.ask("set_joint_en_state", joint_en_state=[2, 1])["joint_en_state"] is False
     assert bench.ask("set_joint_en_state", joint_en_state=[2, 0])["joint_en_state"] is True
+    bench.run(1)
     assert bench.events[-1]["trajectory_state"] is False
     bench.run(1000)
     assert not bench.controller.is_moving

@@ -69,6 +69,16 @@ def test_offsets_and_steps_of_the_tool_begin_where_the_motion_before_them_ends(b
     assert shifts[2][:3] == pytest.approx([0, 0, -5000], abs=8)  # Its z axis points down, by 1 mrad.
 
 
+@pytest.mark.parametrize("command", [{"command": "movej", "joint": FRONT}, {"command": "movel", "pose": [9000000] * 6}])
+def test_an_event_never_comes_together_with_the_answer(bench, command):
+    """A client in single-thread mode that receives both at once misses the event."""
+    assert bench.ask(**command, v=50)["receive_state"] is True
+    bench.run(9)
+    assert bench.events == []
+    bench.run(3)
+    assert [event["trajectory_state"] for event in bench.events] == [command["command"] == "movej"]
+
+
 def test_a_motion_ends_teaching(bench):
     bench.ask("set_joint_teach", teach_joint=1, direction="pos", v=20)
     bench.run(300)
@@ -89,7 +99,7 @@ def test_an_unfinished_chain_has_an_event_for_each_command_when_it_is_discarded(
         bench.ask("set_joint_en_state", joint_en_state=[2, 0])
     else:
         bench.ask(stop)
-    bench.run(5)
+    bench.run(11)
     assert [event["trajectory_state"] for event in bench.events] == [False, False]
     assert bench.pose[2] == pose[2]
 
