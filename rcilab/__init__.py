@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rcilab.cell.cell import Cell as Cell
+    from rcilab.cell.plan_free import plan_free as plan_free
     from rcilab.conformance.check import check as check
     from rcilab.conformance.motion_monitor import Monitor as Monitor
     from rcilab.conformance.report import Report as Report
@@ -61,6 +62,7 @@ _HOMES = {
     "SafetyBox": "rcilab.core.safety_box",
     "ClearanceLimit": "rcilab.core.clearance",
     "Waypoint": "rcilab.motion.waypoint",
+    "plan_free": "rcilab.cell.plan_free",
     "check": "rcilab.conformance.check",
     "connect": "rcilab.execution.connect",
     "load_model": "rcilab.model.robot_model",

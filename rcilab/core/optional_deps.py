@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeAlias
 
 from rcilab.core.errors import UsageError
 
-Extra: TypeAlias = Literal["export", "franka", "lab", "realman", "xarm"]
+Extra: TypeAlias = Literal["export", "franka", "lab", "planning", "realman", "xarm"]
 
 
 class MissingExtraError(UsageError):

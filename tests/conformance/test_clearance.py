@@ -208,7 +208,8 @@ def test_a_hand_in_the_base_is_refused_and_the_report_says_who_meets_whom():
     [violation] = report.violations
     assert violation.condition.id == "clearance.links"
     assert violation.value == found.distance[worst] < -0.05
-    assert violation.links == tuple(found.links[worst])
+    assert violation.links is not None
+    assert violation.links[:2] == tuple(found.links[worst])
     assert {row.id for row in report.rows if row.condition.is_clearance} == {
         "clearance.links",
         "clearance.links.advised",
