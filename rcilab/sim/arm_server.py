@@ -72,6 +72,7 @@ _RECORDER_TIMEOUT = 5.0  # [s] In lock-step; then its motions have gaps.
 CORRUPTED_TIMEOUT = 0.05  # [s] The same with simulated corruption of datagrams: below any client's own timeout.
 SLIP = 20  # [cycles] A motion that took this much longer than planned is logged.
 _MOST_VIOLATIONS = 3  # That the text of a fault names; the others are in its facts.
+_UNATTENDED_CYCLES = 10  # Computed together while no client is connected; a tuning value.
 GRACE = 2.0  # [s] For the arm to stop before the controller ends.
 _parts_log = logging.getLogger("rcilab.sim")
 _STDERR = 2
@@ -278,6 +279,8 @@ class ArmServer:
                 self._await_start()
                 self._timer.restart(self._clock.now())
             else:
+                if self._is_unattended:
+                    self._advance_unattended()
                 due = self._timer.next(self._clock.now())
                 is_idle = self._is_idle
                 if not (is_idle and has_served):
@@ -421,8 +424,23 @@ class ArmServer:
 
         A request may then take effect one state later, which is irrelevant for a stationary arm.
         """
-        is_quiet = self._server.is_quiet and self._endpoint.has_client
-        return is_quiet and not (self.controller.is_moving or self.config.lockstep)
+        return self._server.is_quiet and not (self.controller.is_moving or self.config.lockstep)
+
+    @property
+    def _is_unattended(self) -> bool:
+        """Whether no client is connected or receives states, and nothing moves."""
+        return self._is_idle and not (self._endpoint.peers or self._endpoint.fixed_target or self._is_ending)
+
+    def _advance_unattended(self) -> None:
+        """Waits for several cycles or until something arrives, then computes the cycles that have become due.
+
+        Waking up costs several times the processor time of such a cycle.
+        """
+        self._poll(self._timer.deadline + _UNATTENDED_CYCLES * CYCLE_TIME - self._clock.now())
+        due = int((self._clock.now() - self._timer.deadline) / CYCLE_TIME)
+        for _ in range(min(due, _UNATTENDED_CYCLES)):
+            self._timer.next(self._timer.deadline)
+            self._advance_unsent()
 
     def _step(self, due: float) -> bool:
         """Advances by a cycle and sends its state when it is due, or at once if it is overdue.

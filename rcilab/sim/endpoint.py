@@ -119,11 +119,6 @@ class Endpoint:
         return None if self._fixed_target is None else self._fixed_target[0]
 
     @property
-    def has_client(self) -> bool:
-        """Whether a client is connected to the main channel."""
-        return any(peer.channel is self._main for peer in self._sockets)
-
-    @property
     def peers(self) -> list[Peer]:
         """The connected clients."""
         return list(self._sockets)

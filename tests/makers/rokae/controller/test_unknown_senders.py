@@ -177,7 +177,7 @@ def test_unknown_senders_are_counted_again_for_the_next_client():
         endpoint = found.server._endpoint
         for _ in range(2):
             with socket.create_connection((found.host, found.port)):
-                wait_for(lambda: endpoint.has_client, 30.0, "a client")
+                wait_for(lambda: endpoint.peers, 30.0, "a client")
                 wanted = endpoint.unknown_senders + 1000
 
                 def is_counted(wanted: int = wanted) -> bool:
@@ -186,7 +186,7 @@ def test_unknown_senders_are_counted_again_for_the_next_client():
                     return endpoint.unknown_senders >= wanted
 
                 wait_for(is_counted, 30.0, "unknown senders to be counted")
-            wait_for(lambda: not endpoint.has_client, 30.0, "the client to leave")
+            wait_for(lambda: not endpoint.peers, 30.0, "the client to leave")
 
 
 def test_a_connect_request_is_for_its_own_connection_and_for_ports_of_programs():

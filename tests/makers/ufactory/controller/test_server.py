@@ -101,6 +101,19 @@ def test_several_arms_have_an_address_each() -> None:
                 assert client.recv(100)[8:12] == name
 
 
+def test_without_clients_several_cycles_are_computed_after_one_wait(server: Server) -> None:
+    loop = server.server
+    loop._advance()
+    loop._timer.restart(loop._clock.now())
+    assert loop._is_unattended
+    polls, cycle = loop._endpoint._polls, loop.controller.cycle_number
+    loop._advance_unattended()
+    assert loop._endpoint._polls == polls + 1
+    assert loop.controller.cycle_number == cycle + 10
+    with server.connect(server.ports[30003]):
+        assert not loop._is_unattended
+
+
 def test_a_motion_is_not_charged_with_cycles_that_were_missed_before_it(server: Server) -> None:
     """It begins between two cycles, as a request does that is served while none is computed."""
     loop, controller = server.server, server.server.controller
