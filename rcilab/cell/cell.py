@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from math import cos
 from os import PathLike
+from pathlib import Path
 from typing import Protocol, TypeVar
 
 from rcilab.cell.cell_file import load_cell, save_cell
@@ -24,6 +25,7 @@ from rcilab.robots import describe_robot
 MOST = 1000
 """Largest number of obstacles, frames, parts or signals."""
 _UPRIGHT = 1.0 - cos(1e-3)
+_EXAMPLES = Path(__file__).parent / "examples"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -213,6 +215,18 @@ class Cell:
             VersionMismatchError: It has another version of this format.
         """
         return load_cell(file, cls)
+
+    @classmethod
+    def example(cls, name: str) -> Cell:
+        """Returns one of the cells that come with rcilab: "pick_place", "machine_tending", "polishing".
+
+        Raises:
+            InvalidValueError: No example has this name.
+        """
+        files = {file.stem: file for file in sorted(_EXAMPLES.glob("*.json"))}
+        if name not in files:
+            raise InvalidValueError("example", described(name), f"is unknown; there are: {', '.join(files)}")
+        return cls.load(files[name])
 
     def __repr__(self) -> str:
         return f"<Cell {self.name or 'of ' + self.model}: {self.model}, {len(self.obstacles)} obstacles>"

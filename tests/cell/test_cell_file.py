@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import rcilab
 from rcilab.cell.cell import Cell
 from rcilab.cell.cell_file import read_cell
 from rcilab.cell.entries import Frame, Obstacle, Signal
@@ -16,6 +17,7 @@ from rcilab.core.errors import InvalidValueError, VersionMismatchError
 from rcilab.core.spatial import Pose
 from rcilab.model.dynamics.payload import Payload
 
+ROOT = Path(__file__).parents[2]
 TETRAHEDRON = """solid part
 facet normal 0 0 0
 outer loop
@@ -108,6 +110,38 @@ def test_meshes_are_found_from_where_the_file_is(folder: Path) -> None:
     cell.save(folder / "cells" / "cell.json")
     assert "../part.stl" in (folder / "cells" / "cell.json").read_text()
     assert Cell.load(folder / "cells" / "cell.json").fingerprint == cell.fingerprint
+
+
+@pytest.fixture(scope="module")
+def schema():
+    import jsonschema  # Takes 2 s, which other workers need not wait for.
+
+    content = json.loads((ROOT / "rcilab/cell/cell.schema.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator.check_schema(content)
+    return jsonschema.Draft202012Validator(content)
+
+
+@pytest.mark.parametrize("name", ["pick_place", "machine_tending", "polishing"])
+def test_an_example_is_free_at_home_and_fits_the_schema(schema, name: str) -> None:
+    schema.validate(json.loads((ROOT / f"rcilab/cell/examples/{name}.json").read_text(encoding="utf-8")))
+    cell = Cell.example(name)
+    model = cell.applied_to(rcilab.load_model(cell.model))
+    motion = rcilab.plan_joint(model, model.home, model.home + 1e-3)
+    report = rcilab.check(motion, model, cell=cell)
+    assert report.ok, str(report)
+
+
+def test_a_written_cell_fits_the_schema_and_wrong_ones_do_not(schema, folder: Path) -> None:
+    whole_cell(folder).save(folder / "cell.json")
+    content = json.loads((folder / "cell.json").read_text())
+    schema.validate(content)
+    for obstacle in ({"name": "a", "shape": "sphere", "radius": 1.0, "size": [1, 1, 1]}, {"name": "a", "shape": "box"}):
+        assert not schema.is_valid({**content, "obstacles": [obstacle]})
+
+
+def test_an_unknown_example_is_named() -> None:
+    with pytest.raises(InvalidValueError, match="there are: machine_tending, pick_place, polishing"):
+        Cell.example("welding")
 
 
 @pytest.mark.parametrize(
