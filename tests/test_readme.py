@@ -44,11 +44,19 @@ def test_the_program_written_by_hand_is_sound_and_the_one_from_python_runs(tmp_p
 
 
 def test_the_parts_of_the_lab_combine_around_a_session_as_printed() -> None:
-    code = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[2]
+    code = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[3]
     end = "assert plan.state is run.state is scene.state\nrobot.close()\n"
     result = subprocess.run([sys.executable, "-c", code + end], capture_output=True, text=True, timeout=60, cwd=ROOT)
     assert result.returncode == 0, result.stderr
     assert "conforms" in result.stdout
+
+
+def test_the_motion_in_a_cell_conforms() -> None:
+    code = next(block for block in re.findall(r"```python\n(.*?)```", README, re.DOTALL) if "Cell.example" in block)
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, cwd=ROOT)
+    assert result.returncode == 0, result.stderr
+    assert "clearance.cell" in result.stdout
+    assert "does not conform" not in result.stdout
 
 
 def test_both_set_up_commands_stand_on_a_line_of_their_own() -> None:

@@ -12,7 +12,7 @@ from typing import Protocol, TypeVar
 
 from rcilab.cell.cell_file import load_cell, save_cell
 from rcilab.cell.entries import WORLD, Frame, Obstacle, Signal
-from rcilab.cell.shapes import Solid
+from rcilab.cell.shapes import LARGEST, Solid
 from rcilab.cell.tool import Part, Tool, require_name
 from rcilab.core.arrays import as_number, described
 from rcilab.core.clearance import ClearanceLimit
@@ -66,7 +66,10 @@ class Cell:
             tilt = self.T_world_base.rotation[:, 2].tolist()
             raise InvalidValueError("pose of the base", tilt, "must be upright: its z axis is up, 0 0 1")
         if self.floor is not None:
-            object.__setattr__(self, "floor", as_number(self.floor, "floor", "m"))
+            height = as_number(self.floor, "floor", "m")
+            if not abs(height) <= LARGEST:
+                raise InvalidValueError("floor", height, f"must be within {LARGEST:g} m of the world's origin")
+            object.__setattr__(self, "floor", height)
         for name, kind in (("obstacles", Obstacle), ("frames", Frame), ("parts", Part), ("signals", Signal)):
             found = getattr(self, name)
             if not isinstance(found, tuple | list) or not all(isinstance(entry, kind) for entry in found):

@@ -19,7 +19,7 @@ from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.model.dynamics.payload import Payload
 from rcilab.motion.json_fields import (
     located,
-    place,
+    location,
     read_list,
     read_number,
     read_object,
@@ -146,10 +146,10 @@ class _Reader:
                 ).coded("file_missing", file=self._name, key=key)
         if found["format"].value != FORMAT:
             raise InvalidValueError(
-                place(self._name, found["format"], "format"), found["format"].plain(), f"must be {FORMAT!r}"
+                location(self._name, found["format"], "format"), found["format"].plain(), f"must be {FORMAT!r}"
             )
         if found["version"].value != float(VERSION):
-            what = place(self._name, found["version"], "version")
+            what = location(self._name, found["version"], "version")
             raise VersionMismatchError(what, found["version"].plain(), VERSION, "the rcilab that wrote it reads it")
         values: dict[str, Any] = {
             key: read_text(self._name, found[key], key)
@@ -264,12 +264,12 @@ class _Reader:
         kind = read_text(self._name, found["shape"], f"{what}, shape")
         if kind not in SHAPES:
             raise InvalidValueError(
-                place(self._name, found["shape"], f"{what}, shape"), kind, f"is unknown; known: {', '.join(SHAPES)}"
+                location(self._name, found["shape"], f"{what}, shape"), kind, f"is unknown; known: {', '.join(SHAPES)}"
             )
         for key in _SHAPE[1:]:
             if key in found and key not in _OF_SHAPE[kind]:
                 problem = f"has no meaning for a {kind}; it takes: {', '.join(_OF_SHAPE[kind]) or 'nothing'}"
-                raise InvalidValueError(place(self._name, found[key], f"{what}, {key}"), found[key].plain(), problem)
+                raise InvalidValueError(location(self._name, found[key], f"{what}, {key}"), found[key].plain(), problem)
         for key in _OF_SHAPE[kind]:
             if key not in found and key != "scale":
                 raise self._missing(node, what, key)
@@ -302,7 +302,7 @@ class _Reader:
         return {key: read_text(self._name, found[key], f"{what}, {key}") for key in keys if key in found}
 
     def _missing(self, node: Node, what: str, key: str) -> InvalidValueError:
-        return InvalidValueError(place(self._name, node, f"{what}, {key}"), None, "is missing").coded(
+        return InvalidValueError(location(self._name, node, f"{what}, {key}"), None, "is missing").coded(
             "file_missing", file=self._name, key=key
         )
 

@@ -24,6 +24,7 @@ from rcilab.core.clearance import FLOOR, OBSTACLE, PART, TOOL, ClearanceLimit, L
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.model.kinematics.collision import ClearanceQuery, CollisionGeometry, capsule_solid, compute_levers
 from rcilab.model.robot_model import RobotModel
+from rcilab.robots.description import RobotDescription
 from rcilab.robots.shapes import Capsule
 from rcilab.robots.upright import upright_flange
 
@@ -63,21 +64,30 @@ class CellGeometry:
     """The arm, what it carries, the obstacles, and the pairs to check. Immutable.
 
     Args:
-        model: The arm, with the tool of the cell.
+        own: The capsules of the arm.
+        description: The arm.
+        T_flange_tool: Pose of the tool.
         cell: The cell.
-        distance: Required distances, with the floor of the cell.
+        floor_height: Height of the floor in the base frame, [m]; None without a floor.
     """
 
-    def __init__(self, model: RobotModel, cell: Cell, distance: ClearanceLimit) -> None:
-        self.own: CollisionGeometry = model.collision_geometry(distance)
+    def __init__(
+        self,
+        own: CollisionGeometry,
+        description: RobotDescription,
+        T_flange_tool: Pose,
+        cell: Cell,
+        floor_height: float | None,
+    ) -> None:
+        self.own = own
         self.model = pin.GeometryModel()
-        n = model.n
+        n = description.n
         links = [
             self._add(capsule_solid(capsule, min(number, n)), number if number <= n else TOOL)
             for number, capsules in enumerate(self.own.bodies)
             for capsule in capsules
         ]
-        carried = self._add_carried(model, cell)
+        carried = self._add_carried(description, T_flange_tool, cell)
         obstacles = [
             body
             for index, obstacle in enumerate(cell.obstacles)
@@ -91,11 +101,11 @@ class CellGeometry:
         before = [body for body in links if 0 <= body.link < n - 1]  # Carried bodies touch the last two links.
         self.links = self._pair([(a, b) for a in carried for b in before], n)
         floor: list[_Body] = []
-        if distance.floor_height is not None:
-            plane = pin.GeometryObject("", 0, pin.SE3.Identity(), half_space(distance.floor_height))
+        if floor_height is not None:
+            plane = pin.GeometryObject("", 0, pin.SE3.Identity(), half_space(floor_height))
             floor.append(self._add(plane, FLOOR))
         self.floor = self._pair([(a, b) for a in carried for b in floor], n)
-        self.levers = readonly_copy(compute_levers(model.description, [*self.own.bodies, self._around(carried)]))
+        self.levers = readonly_copy(compute_levers(description, [*self.own.bodies, self._around(carried)]))
         """Largest distance of any point of arm, tool or part from each joint's axis, shape (n,), [m]."""
         self.names = tuple(obstacle.name for obstacle in cell.obstacles)
 
@@ -110,16 +120,19 @@ class CellGeometry:
             self._add(pin.GeometryObject("", joint, placement, shape), link) for shape in convex_solids(solid.shape)
         ]
 
-    def _add_carried(self, model: RobotModel, cell: Cell) -> list[_Body]:
+    def _add_carried(self, description: RobotDescription, T_flange_tool: Pose, cell: Cell) -> list[_Body]:
         """Adds the bodies of tool and part, on the last link."""
         T_link_flange = np.eye(4)
-        T_link_flange[:3, :3] = upright_flange(model.description).rotation
+        T_link_flange[:3, :3] = upright_flange(description).rotation
         groups = [(TOOL, () if cell.tool is None else cell.tool.solids_at())]
         if cell.part is not None:
-            groups.append((PART, cell.part.at_flange(model.T_flange_tool)[1]))
+            groups.append((PART, cell.part.at_flange(T_flange_tool)[1]))
         T = Pose.from_matrix(T_link_flange)
         return [
-            body for link, solids in groups for solid in solids for body in self._add_solid(solid, model.n, link, T)
+            body
+            for link, solids in groups
+            for solid in solids
+            for body in self._add_solid(solid, description.n, link, T)
         ]
 
     def _around(self, bodies: list[_Body]) -> list[Capsule]:
@@ -195,16 +208,27 @@ class _Search:
                 best, pair = found, pairs.links[k]
 
 
-@lru_cache(maxsize=16)
 def cell_geometry(model: RobotModel, cell: Cell, distance: ClearanceLimit) -> CellGeometry:
-    """Returns the geometry of an arm in a cell; cached.
+    """Returns the geometry of an arm in a cell; cached for the same cell.
 
     Args:
         model: The arm, with the tool of the cell.
         cell: The cell.
         distance: Required distances, with the floor of the cell.
     """
-    return CellGeometry(model, cell, distance)
+    own, tool = model.collision_geometry(distance), model.T_flange_tool.as_row_major()
+    return _build(own, model.description, tool, cell, distance.floor_height)
+
+
+@lru_cache(maxsize=16)
+def _build(
+    own: CollisionGeometry,
+    description: RobotDescription,
+    tool: tuple[float, ...],
+    cell: Cell,
+    floor_height: float | None,
+) -> CellGeometry:
+    return CellGeometry(own, description, Pose.from_row_major(tool), cell, floor_height)
 
 
 def _link_pair(first: int, second: int) -> LinkPair:

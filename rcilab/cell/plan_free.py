@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.cell.cell import Cell, required_distance
+from rcilab.cell.clearance_path import clearance_path
 from rcilab.cell.clearance_query import DistanceQuery, build_query
-from rcilab.cell.free_path import STEP, find_path
+from rcilab.cell.free_path import FreeSpace, find_path
 from rcilab.core.arrays import Array, JointPath, JointVector, as_number, as_vector, require_radians
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit, LinkPair
 from rcilab.core.errors import InvalidValueError, PlanningError
@@ -78,16 +79,14 @@ def plan_free(
     for name, q in (("start", start), ("goal", goal)):
         _require_free(query, required, q, name)
     joint, room = model.limits.joint, _room(query, required, start, goal)
-    corners = find_path(
-        start,
-        goal,
-        (joint.lower, joint.upper),
-        lambda q: _excess(query, required, q)[0] - room,
-        levers,
-        seed=int(seed),
-        budget=seconds,
-        progress=progress or _ignore,
+    space = FreeSpace(
+        lower=joint.lower,
+        upper=joint.upper,
+        clearance=lambda q: _excess(query, required, q)[0] - room,
+        levers=levers,
     )
+    report = progress or _ignore
+    corners = find_path(space, start, goal, seed=int(seed), budget=seconds, progress=report)
     if corners is None:
         raise PlanningError(
             f"no path around the obstacles was found in {seconds:g} s: give the search more time (budget=...), another "
@@ -95,19 +94,12 @@ def plan_free(
         )
     if len(corners) == 2:
         return straight
-    return _timed(model, corners, speed, law, lambda q: _is_clear(q, query, required, levers))
-
-
-def _timed(
-    model: RobotModel, corners: JointPath, speed: float, law: JointLaw, is_clear: Callable[[JointPath], bool]
-) -> Motion:
-    """Returns the motion through the corners with the largest blends that stay clear."""
     waypoints = [Waypoint.joint(q, speed=speed) for q in corners[1:]]
     for blend in _BLENDS:
         rounded = tuple(replace(waypoint, blend=blend) for waypoint in waypoints)
         program = Program(model=model.name, start=tuple(corners[0].tolist()), waypoints=rounded)
-        motion = plan_program(model, program, law=law)
-        if is_clear(motion.q):
+        motion = plan_program(model, program, law=law, progress=lambda _: report(1.0))
+        if _is_clear(motion.q, query, required, levers):
             return motion
     raise PlanningError("the motion along the path comes too near: use another seed, or require less distance")
 
@@ -133,17 +125,10 @@ def _require_free(query: DistanceQuery, required: ClearanceLimit, q: JointVector
 
 
 def _is_clear(path: JointPath, query: DistanceQuery, required: ClearanceLimit, levers: Array) -> bool:
-    """Returns whether every row of a motion keeps the distances; rows that the last distance covers are skipped."""
-    travel = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(path, axis=0)) @ levers)))
-    row = 0
-    while True:
-        excess, _ = _excess(query, required, path[row])
-        if excess <= 0.0:
-            return False
-        if row == len(path) - 1:
-            return True
-        reach = int(np.searchsorted(travel, travel[row] + max(excess, STEP), side="right")) - 1
-        row = min(max(row + 1, reach), len(path) - 1)
+    """Returns whether a motion keeps the distances in every cycle, as `check` finds them."""
+    pairs = ((query.links, required.links), (query.floor, required.floor), (query.cell, required.cell))
+    found = ((clearance_path(compute, path, path[0], levers, (least,)), least) for compute, least in pairs)
+    return all(float(distances.distance.min()) > least for distances, least in found)
 
 
 def _ignore(share: float) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rcilab.cell.cell import Cell, has_obstacles
+from rcilab.cell.clearance_path import sample_cycle
 from rcilab.cell.clearance_query import build_query
 from rcilab.conformance.clearance_conditions import clearance_conditions
-from rcilab.conformance.clearance_path import sample_cycle
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.arrays import JointVector, as_vector
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit, LinkPair

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.cell.cell import Cell, has_obstacles
+from rcilab.cell.clearance_path import ClearancePath, clearance_path
 from rcilab.cell.clearance_query import build_query
 from rcilab.conformance.clearance_conditions import clearance_conditions
-from rcilab.conformance.clearance_path import ClearancePath, clearance_path
 from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.start import StartState, as_start
 from rcilab.conformance.tool_signals import ToolSignals

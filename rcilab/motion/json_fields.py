@@ -91,7 +91,7 @@ def located(error: InvalidValueError, name: str, node: Node, prefix: str = "", n
     return placed.coded("file_value", reason=reason, **facts)
 
 
-def place(name: str, node: Node, key: str) -> str:
+def location(name: str, node: Node, key: str) -> str:
     """Returns where a value is, for errors."""
     return f"{name}, line {node.line}, {key}"
 
@@ -102,6 +102,6 @@ def excerpt(value: object) -> str:
 
 
 def _wrong_type(name: str, node: Node, key: str, problem: str) -> InvalidValueError:
-    return InvalidValueError(place(name, node, key), node.plain(), problem).coded(
+    return InvalidValueError(location(name, node, key), node.plain(), problem).coded(
         "file_kind", file=name, line=node.line, key=key
     )

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from rcilab.core.arrays import described
 from rcilab.core.atomic_file import read_limited, replacing
 from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchError
-from rcilab.motion.json_fields import excerpt, located, place, read_number, read_object, read_text, read_vector
+from rcilab.motion.json_fields import excerpt, located, location, read_number, read_object, read_text, read_vector
 from rcilab.motion.located_json import LongListError, Node, read_json, require_length
 from rcilab.motion.waypoint import ALLOWED, CHOICES, COMMON_FIELDS, MOST_WAYPOINTS, Waypoint, require_count, require_fit
 from rcilab.robots import RobotDescription, describe_robot
@@ -107,7 +107,7 @@ def read_program(content: bytes, name: str, build: Callable[..., P]) -> P:
             advice = "the rcilab that wrote it reads it; a program written by hand has version 1"
             raise VersionMismatchError(what, _as_json_number(value), VERSION, advice)
         if value != expected:
-            raise InvalidValueError(place(name, found[key], key), found[key].plain(), f"must be {expected!r}").coded(
+            raise InvalidValueError(location(name, found[key], key), found[key].plain(), f"must be {expected!r}").coded(
                 "file_no_program", file=name, line=found[key].line
             )
     for key in ("model", "start", "waypoints"):
@@ -120,13 +120,13 @@ def read_program(content: bytes, name: str, build: Callable[..., P]) -> P:
     waypoint_list = found["waypoints"]
     if not isinstance(waypoint_list.value, list):
         raise InvalidValueError(
-            place(name, waypoint_list, "waypoints"), waypoint_list.plain(), "must be a list [{...}, {...}]"
+            location(name, waypoint_list, "waypoints"), waypoint_list.plain(), "must be a list [{...}, {...}]"
         ).coded("file_kind", file=name, line=waypoint_list.line, key="waypoints")
     try:
         robot = describe_robot(str(texts["model"]))
     except ModelError as error:
         raise InvalidValueError(
-            place(name, found["model"], "model"), texts["model"], f"is not a known model: {error}"
+            location(name, found["model"], "model"), texts["model"], f"is not a known model: {error}"
         ).coded("file_model", file=name, line=found["model"].line, model=excerpt(texts["model"])) from error
     try:
         require_count(len(waypoint_list.value))

@@ -37,6 +37,7 @@ def cell_with(**values) -> Cell:
         (lambda: cell_with(obstacles=(replace(WALL, frame="table"),)), "frame of wall.*there are: world"),
         (lambda: cell_with(frames=(Frame(name="a", parent="b"),)), "parent of a.*not a frame above it"),
         (lambda: cell_with(frames=(Frame(name="world"),)), "choose another"),
+        (lambda: cell_with(floor=float("inf")), "floor.*within 100 m"),
         (lambda: cell_with(held="bolt"), "held.*there are: none"),
         (lambda: cell_with(T_world_base=Pose.from_rpy((0, 0, 0), (0.3, 0, 0))), "upright"),
     ],

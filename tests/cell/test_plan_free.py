@@ -84,3 +84,18 @@ def test_the_progress_cancels_the_search() -> None:
 def test_bad_values_are_named(values, said: str) -> None:
     with pytest.raises(InvalidValueError, match=said):
         rcilab.plan_free(MODEL, START, GOAL, CELL, **values)
+
+
+def test_the_library_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    rcilab.plan_free(MODEL, START, GOAL, CELL, seed=1)
+    rcilab.plan_free(MODEL, START, GOAL, CELL, seed=2)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_search_can_be_cancelled_while_it_shortens_the_path() -> None:
+    def cancel(share: float) -> None:
+        if share == 1.0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        rcilab.plan_free(MODEL, START, GOAL, CELL, progress=cancel, budget=60.0)

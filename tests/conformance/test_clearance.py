@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcilab.cell.clearance_path import MAX_STEP, MAX_TRAVEL, clearance_path, sample_cycle
 from rcilab.conformance.check import HOLD_SAMPLES, check
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.clearance_monitor import ClearanceMonitor
-from rcilab.conformance.clearance_path import MAX_STEP, MAX_TRAVEL, clearance_path, sample_cycle
 from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.core.clearance import FLOOR, ClearanceLimit, LinkPair
 from rcilab.core.clock import CYCLE_TIME

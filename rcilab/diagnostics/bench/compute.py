@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from rcilab.cell.clearance_path import clearance_path
 from rcilab.conformance.check import check
-from rcilab.conformance.clearance_path import clearance_path
 from rcilab.core.arrays import Array
 from rcilab.core.clearance import ADVISED_DISTANCE
 from rcilab.core.errors import UnreachableError
