@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from rcilab.cell.cell_file import load_cell, save_cell
+from rcilab.cell.cell_storage import load_cell, save_cell
 from rcilab.cell.entries import WORLD, Frame, Obstacle, Signal
 from rcilab.cell.shapes import LARGEST, Solid
 from rcilab.cell.tool import Part, Tool, require_name
@@ -202,16 +202,16 @@ class Cell:
         return hashlib.sha256(repr(_plain(counted)).encode()).hexdigest()
 
     def save(self, file: str | PathLike[str]) -> None:
-        """Writes the cell as JSON; meshes stay in their files, whose names are written relative to this one.
+        """Writes the cell as .json, with the names of the files of its meshes, or as .zip, with the meshes themselves.
 
         Raises:
-            InvalidValueError: The name does not end in .json, or the file cannot be written.
+            InvalidValueError: The name has another ending, the file cannot be written, or a mesh for .json has no file.
         """
         save_cell(self, file)
 
     @classmethod
     def load(cls, file: str | PathLike[str]) -> Cell:
-        """Returns the cell in a file.
+        """Returns the cell in a file, .json or .zip.
 
         Raises:
             InvalidValueError: The file does not exist, or its cell is not valid; the message names the line.

@@ -1,19 +1,17 @@
-"""Cells as JSON: one entry a line, errors that name the line. Schema: cell.schema.json."""
+"""Cells as JSON: one entry a line, errors that name the line. Schema: cell.schema.json.
+
+Meshes are files of their own: a JSON file names them relative to itself, a ZIP archive contains them, too.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from os import PathLike, fspath, path
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from rcilab.cell.entries import WORLD, Frame, Obstacle, Signal
-from rcilab.cell.mesh_file import load_mesh
 from rcilab.cell.shapes import SHAPES, MeshShape, Plane, Shape, Solid, shape_name
 from rcilab.cell.tool import Jaws, Part, Tool
-from rcilab.core.arrays import described
-from rcilab.core.atomic_file import read_limited, replacing
 from rcilab.core.errors import InvalidValueError, VersionMismatchError
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.model.dynamics.payload import Payload
@@ -26,12 +24,17 @@ from rcilab.motion.json_fields import (
     read_text,
     read_vector,
 )
-from rcilab.motion.located_json import Node, read_json, require_length
+from rcilab.motion.located_json import Node, read_json
 
 if TYPE_CHECKING:
     from rcilab.cell.cell import Cell
 
 T = TypeVar("T")
+
+MeshNames: TypeAlias = Callable[[MeshShape], tuple[str, float]]
+"""Returns the file of a mesh, and the factor on its lengths."""
+MeshSource: TypeAlias = Callable[[str, float], MeshShape]
+"""Returns the mesh of a file with a factor on its lengths."""
 
 FORMAT = "rcilab cell"
 VERSION = 1
@@ -49,15 +52,15 @@ _OF_SHAPE = {
 }  # fmt: skip
 
 
-def cell_text(cell: Cell, folder: Path) -> str:
+def cell_text(cell: Cell, name_mesh: MeshNames) -> str:
     """Returns a cell as JSON.
 
     Args:
         cell: The cell.
-        folder: Where the file will be; names of meshes are relative to it.
+        name_mesh: Returns the file of a mesh, and the factor on its lengths.
 
     Raises:
-        InvalidValueError: A mesh was not read from a file.
+        InvalidValueError: As of `name_mesh`.
     """
     lines = [f'"format": "{FORMAT}"', f'"version": {VERSION}']
     for key, value in (("name", cell.name), ("model", cell.model)):
@@ -67,11 +70,11 @@ def cell_text(cell: Cell, folder: Path) -> str:
         lines.append(f'"base": {_text(_pose(cell.T_world_base))}')
     lines.append(f'"floor": {_text(cell.floor)}')
     if cell.tool is not None:
-        lines.append(f'"tool": {_text(_tool(cell.tool, folder))}')
+        lines.append(f'"tool": {_text(_tool(cell.tool, name_mesh))}')
     lists: tuple[tuple[str, list[dict[str, Any]]], ...] = (
         ("frames", [_frame(frame) for frame in cell.frames]),
-        ("obstacles", [_obstacle(obstacle, folder) for obstacle in cell.obstacles]),
-        ("parts", [_part(part, folder) for part in cell.parts]),
+        ("obstacles", [_obstacle(obstacle, name_mesh) for obstacle in cell.obstacles]),
+        ("parts", [_part(part, name_mesh) for part in cell.parts]),
         ("signals", [{"name": s.name, "kind": s.kind, "channel": s.channel} for s in cell.signals]),
     )
     for key, entries in lists:
@@ -84,58 +87,27 @@ def cell_text(cell: Cell, folder: Path) -> str:
     return "{\n" + ",\n".join(f"  {line}" for line in lines) + "\n}\n"
 
 
-def save_cell(cell: Cell, file: str | PathLike[str]) -> None:
-    """Writes a cell as JSON.
-
-    Raises:
-        InvalidValueError: The name does not end in .json, the file cannot be written, or a mesh has no file.
-    """
-    target = _as_path(file)
-    if target.suffix.lower() != ".json":
-        raise InvalidValueError("cell file", str(target), "must end in .json")
-    text = cell_text(cell, target.parent)
-    try:
-        with replacing(target) as stream:
-            stream.write(text.encode())
-    except OSError as error:
-        raise InvalidValueError("cell file", str(target), f"cannot be written: {error.strerror}").coded(
-            "file_unwritable", file=str(target)
-        ) from error
-
-
-def load_cell(file: str | PathLike[str], build: Callable[..., T]) -> T:
-    """Returns the cell in a file; arguments as of `read_cell`.
-
-    Raises:
-        InvalidValueError: The file does not exist, or its cell is not valid; the message names the line.
-        VersionMismatchError: It has another version of this format.
-    """
-    source = _as_path(file)
-    content = read_limited(source, "cell file", lambda size: require_length(size, source.name))
-    return read_cell(content, source.name, source.parent, build)
-
-
-def read_cell(content: bytes, name: str, folder: Path, build: Callable[..., T]) -> T:
+def read_cell(content: bytes, name: str, find_mesh: MeshSource, build: Callable[..., T]) -> T:
     """Returns the cell in a JSON text, built by `build` with the keyword arguments of `Cell`.
 
     Args:
         content: JSON in UTF-8.
         name: Name of the text, for errors.
-        folder: Folder that names of meshes are relative to.
+        find_mesh: Returns the mesh of a file with a factor on its lengths; raises InvalidValueError if there is none.
         build: Builds the cell; raises InvalidValueError for an invalid value.
 
     Raises:
         InvalidValueError: The cell is not valid; the message names line, key, value, bound and remedy.
         VersionMismatchError: It has another version of this format.
     """
-    return _Reader(name, folder).read(read_json(content, name), build)
+    return _Reader(name, find_mesh).read(read_json(content, name), build)
 
 
 class _Reader:
     """Builds one cell from its JSON. Owned by one call of `read_cell`."""
 
-    def __init__(self, name: str, folder: Path) -> None:
-        self._name, self._folder = name, folder
+    def __init__(self, name: str, find_mesh: MeshSource) -> None:
+        self._name, self._find_mesh = name, find_mesh
 
     def read(self, root: Node, build: Callable[..., T]) -> T:
         found = read_object(root, self._name, "a cell", _KEYS)
@@ -278,7 +250,7 @@ class _Reader:
         if kind == "mesh":
             scale = read_number(self._name, found["scale"], f"{what}, scale") if "scale" in found else 1.0
             file = read_text(self._name, found["file"], f"{what}, file")
-            return self._build(lambda: load_mesh(self._folder / file, scale=scale), node, found, what)
+            return self._build(lambda: self._find_mesh(file, scale), node, found, what)
         values: dict[str, Any] = {
             key: (read_vector if key == "size" else read_number)(self._name, found[key], f"{what}, {key}")
             for key in _OF_SHAPE[kind]
@@ -319,19 +291,18 @@ def _pose(pose: Pose) -> dict[str, Any]:
     return found
 
 
-def _shape(shape: Shape, folder: Path) -> dict[str, Any]:
+def _shape(shape: Shape, name_mesh: MeshNames) -> dict[str, Any]:
     kind = shape_name(shape)
     if isinstance(shape, MeshShape):
-        if not shape.file:
-            raise InvalidValueError("mesh", repr(shape), "was not read from a file; save it as STL first")
-        found: dict[str, Any] = {"shape": kind, "file": path.relpath(shape.file, folder)}
-        return found | ({"scale": shape.scale} if shape.scale != 1.0 else {})
+        file, scale = name_mesh(shape)
+        found: dict[str, Any] = {"shape": kind, "file": file}
+        return found | ({"scale": scale} if scale != 1.0 else {})
     values = {key: getattr(shape, key) for key in _OF_SHAPE[kind]}
     return {"shape": kind} | {key: list(v) if isinstance(v, tuple) else v for key, v in values.items()}
 
 
-def _solids(solids: Sequence[Solid], folder: Path) -> list[dict[str, Any]]:
-    return [_shape(solid.shape, folder) | _pose(solid.pose) for solid in solids]
+def _solids(solids: Sequence[Solid], name_mesh: MeshNames) -> list[dict[str, Any]]:
+    return [_shape(solid.shape, name_mesh) | _pose(solid.pose) for solid in solids]
 
 
 def _mass(payload: Payload) -> dict[str, Any]:
@@ -341,19 +312,19 @@ def _mass(payload: Payload) -> dict[str, Any]:
     return found | ({"inertia": payload.inertia.ravel().tolist()} if payload.inertia.any() else {})
 
 
-def _tool(tool: Tool, folder: Path) -> dict[str, Any]:
+def _tool(tool: Tool, name_mesh: MeshNames) -> dict[str, Any]:
     found: dict[str, Any] = {"name": tool.name, "tcp": _pose(tool.T_flange_tool), **_mass(tool.payload)}
     if tool.solids:
-        found["solids"] = _solids(tool.solids, folder)
+        found["solids"] = _solids(tool.solids, name_mesh)
     if tool.jaws is not None:
         jaws: dict[str, Any] = {"open": tool.jaws.open, "closed": tool.jaws.closed}
-        found["jaws"] = jaws | ({"finger": _solids(tool.jaws.finger, folder)} if tool.jaws.finger else {})
+        found["jaws"] = jaws | ({"finger": _solids(tool.jaws.finger, name_mesh)} if tool.jaws.finger else {})
     return found
 
 
-def _part(part: Part, folder: Path) -> dict[str, Any]:
+def _part(part: Part, name_mesh: MeshNames) -> dict[str, Any]:
     found: dict[str, Any] = {"name": part.name, **_mass(part.payload), "held_at": _pose(part.T_tool_part)}
-    return found | ({"solids": _solids(part.solids, folder)} if part.solids else {})
+    return found | ({"solids": _solids(part.solids, name_mesh)} if part.solids else {})
 
 
 def _frame(frame: Frame) -> dict[str, Any]:
@@ -361,14 +332,8 @@ def _frame(frame: Frame) -> dict[str, Any]:
     return {"name": frame.name, **parent, **_pose(frame.T_parent_frame)}
 
 
-def _obstacle(obstacle: Obstacle, folder: Path) -> dict[str, Any]:
-    found: dict[str, Any] = {"name": obstacle.name} | _shape(obstacle.shape, folder) | _pose(obstacle.pose)
+def _obstacle(obstacle: Obstacle, name_mesh: MeshNames) -> dict[str, Any]:
+    found: dict[str, Any] = {"name": obstacle.name} | _shape(obstacle.shape, name_mesh) | _pose(obstacle.pose)
     if obstacle.frame != WORLD:
         found["frame"] = obstacle.frame
     return found | ({"may_touch": list(obstacle.may_touch)} if obstacle.may_touch else {})
-
-
-def _as_path(file: object) -> Path:
-    if not isinstance(file, str | PathLike):
-        raise InvalidValueError("cell file", described(file), "must be a file name")
-    return Path(fspath(file))

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import json
+import zipfile
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +10,7 @@ import pytest
 
 import rcilab
 from rcilab.cell.cell import Cell
-from rcilab.cell.cell_file import read_cell
+from rcilab.cell.cell_storage import read_uploaded
 from rcilab.cell.entries import Frame, Obstacle, Signal
 from rcilab.cell.mesh_file import load_mesh
 from rcilab.cell.shapes import Box, Cylinder, Plane, Solid, Sphere
@@ -112,6 +114,48 @@ def test_meshes_are_found_from_where_the_file_is(folder: Path) -> None:
     assert Cell.load(folder / "cells" / "cell.json").fingerprint == cell.fingerprint
 
 
+def test_an_archive_contains_the_meshes(folder: Path) -> None:
+    cell = whole_cell(folder)
+    cell.save(folder / "cell.zip")
+    (folder / "part.stl").unlink()
+    again = Cell.load(folder / "cell.zip")
+    mesh, loaded = (next(o.shape for o in one.obstacles if o.name == "casting") for one in (cell, again))
+    assert sorted(map(tuple, loaded.vertices.round(6).tolist())) == sorted(map(tuple, mesh.vertices.tolist()))
+    assert again.T_world("tray").is_close(cell.T_world("tray"), 1e-9)
+    again.save(folder / "again.zip")
+    assert (folder / "again.zip").read_bytes() == (folder / "cell.zip").read_bytes()
+    with pytest.raises(InvalidValueError, match=r"cell\.zip"):  # Its meshes belong to no file.
+        again.save(folder / "cell.json")
+
+
+def _archive(**entries: str) -> bytes:
+    packed = BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        for name, content in entries.items():
+            archive.writestr(name.replace("_", "."), content)
+    return packed.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"not an archive", "not a ZIP archive"),
+        (_archive(readme_txt="cell"), "contains no cell.json"),
+        (_archive(cell_json="{"), "cell.zip, cell.json"),
+        (
+            _archive(
+                cell_json='{"format": "rcilab cell", "version": 1, "model": "xMatePro7", "obstacles": '
+                '[{"name": "a", "shape": "mesh", "file": "/etc/hostname.stl"}]}'
+            ),
+            "is not in cell.zip",
+        ),
+    ],
+)
+def test_a_wrong_archive_is_refused(content: bytes, said: str) -> None:
+    with pytest.raises(InvalidValueError, match=said):
+        read_uploaded(content, "cell.zip", Cell)
+
+
 @pytest.fixture(scope="module")
 def schema():
     import jsonschema  # Takes 2 s, which other workers need not wait for.
@@ -161,17 +205,17 @@ def test_an_unknown_example_is_named() -> None:
         (
             {"obstacles": [{"name": "a", "shape": "mesh", "file": "no.stl"}]},
             InvalidValueError,
-            "no.stl.*cannot",
+            "no.stl.*cell.zip",
         ),
         ({"tool": {"mass": -1}}, InvalidValueError, "tool, load mass"),
         ({"model": "xMate9"}, Exception, "xMate9"),
         ({"held": "bolt"}, InvalidValueError, "line 1, held"),
     ],
 )
-def test_a_wrong_file_is_named_by_line_and_key(tmp_path: Path, change: dict, error: type, said: str) -> None:
+def test_a_wrong_file_is_named_by_line_and_key(change: dict, error: type, said: str) -> None:
     content = {"format": "rcilab cell", "version": 1, "model": "xMatePro7", **change}
     with pytest.raises(error, match=said):
-        read_cell(json.dumps(content).encode(), "cell.json", tmp_path, Cell)
+        read_uploaded(json.dumps(content).encode(), "cell.json", Cell)
 
 
 @pytest.mark.parametrize(
