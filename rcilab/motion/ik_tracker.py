@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import degrees, hypot
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from rcilab.core.arrays import Array
 from rcilab.core.errors import SingularError, UnreachableError
 from rcilab.core.spatial import IDENTITY, Pose, rotation_between
+from rcilab.model.kinematics.solvers.newton import MOST_TURNED, OFF_POSITION, WEIGHTS
 from rcilab.model.robot_model import RobotModel
 
 if TYPE_CHECKING:
@@ -22,9 +24,8 @@ _LARGEST_STEP = 0.1  # [rad] A larger one leaves the last angles.
 _MOST_DAMPED_STEPS = 40
 _FARTHEST = 0.6  # [rad] That a joint may be from the last angles after damped steps.
 _DAMPING = 0.1  # Of damped steps, times the square of the error in metres and radians; a tuning value.
-_LEAST_DAMPING = 1e-12  # For arms with fewer than six joints, whose J J^T has no inverse.
+_LEAST_DAMPING = 1e-12  # Where J J^T has no inverse.
 _CONVERGED = 1e-20  # [m^2], [rad^2]
-_ROUNDED = 1e-10  # [m^2], [rad^2]
 _EYE = np.eye(6)
 _SMALLEST = 1e-8  # Determinant of J J^T, in metres and radians: about 1e-3 in a usual pose.
 
@@ -46,7 +47,7 @@ class IkTracker:
         joint = model.redundancy.joint
         self._held = None if joint is None else joint - 1
         self._moving = [i for i in range(model.n) if i != self._held]
-        self._still = np.zeros(model.n)
+        self._still, self._eye = np.zeros(model.n), np.eye(model.n)
 
     def solve(self, T_base_tool: Pose, psi: float, near: Sequence[float]) -> list[float]:
         """Returns the joint angles of a pose, [rad]: those closest to `near`, full turns counted.
@@ -124,9 +125,45 @@ class IkTracker:
             q = q + step
             if np.abs(q - near).max() > _FARTHEST:
                 return None
-            if square < _ROUNDED and len(q) < len(residual) and np.abs(step).max() < _CONVERGING:
-                return q.tolist()  # Fewer than six joints reach a pose of single precision up to its rounding.
         return None
+
+    def aim(self, T_base_tool: Pose, near: Sequence[float], *, most_turned: float = MOST_TURNED) -> list[float]:
+        """Returns the joint angles of an arm with fewer than six joints next to a pose, [rad], near others.
+
+        The tool has the position of the pose, and of the orientations that the arm reaches there the nearest one.
+
+        Args:
+            T_base_tool: Pose of the tool in base.
+            near: Joint angles close to it, n plain floats, [rad].
+            most_turned: By how much the orientation may differ, [rad].
+
+        Raises:
+            UnreachableError: The position is out of reach or far away, or the orientation differs more.
+        """
+        q = np.array(near)
+        for _ in range(_MOST_DAMPED_STEPS):
+            J, error = self._differential(q, T_base_tool)
+            residual = np.array(error)
+            weighted = WEIGHTS[:, np.newaxis] * J
+            damping = _DAMPING * float(residual @ residual) + _LEAST_DAMPING
+            square = weighted.T @ weighted + damping * self._eye
+            step: Array = np.linalg.inv(square) @ (weighted.T @ (WEIGHTS * residual))
+            q = q + step
+            if np.abs(q - near).max() > _FARTHEST:
+                break
+            if np.abs(step).max() >= _CONVERGING:
+                continue
+            turn = hypot(*error[3:])
+            if hypot(*error[:3]) > OFF_POSITION:
+                break
+            if turn > most_turned:
+                raise UnreachableError(
+                    f"an arm with {len(q)} joints turns its tool only about its own axis and in the plane of the arm: "
+                    f"there the orientation would differ by {degrees(turn):.3g} deg, more than "
+                    f"{degrees(most_turned):.3g} deg; give a level orientation, or move there by joint angles"
+                )
+            return q.tolist()
+        raise UnreachableError("no joint angles near the last ones put the tool there")
 
     def _step_to(self, T_base_tool: Pose, held: int, psi: float, near: Sequence[float]) -> list[float] | None:
         """Returns the joint angles near the last ones with one joint held at `psi`, or None if they are not near."""

@@ -38,6 +38,7 @@ acceleration^2 / (2 jerk), and by different amounts: some mm/s at the tool, up t
 MISSED_PART = 0.1
 """Part of a twist that the tool misses when it stops on the way into a singularity: it is 6 degrees off its line."""
 
+_LEVER = 0.1  # [m] At which a turn that fewer than six joints cannot avoid counts as a velocity; a tuning value.
 _LOOKAHEAD = 1e-3  # [rad] Step of the fastest joint to test whether a singularity comes closer.
 _CHANGE = RAMP_PART * CYCLE_TIME  # [s] Times an acceleration: the change of a velocity allowed in a cycle.
 _IDENTITY = np.eye(6)
@@ -87,6 +88,8 @@ class TwistController:
                 (tool.rotation_acceleration, tool.rotation_jerk),
             )
         ]
+        # Fewer than six joints turn a tilted tool a little while they shift it: that is not the end of its reach.
+        self._scale = np.array((1.0, 1.0, 1.0, *(3 * (_LEVER if model.n < 6 else 1.0,))))
         self._in_tool = False
         self._goal = np.zeros(6)
         self._line = np.zeros((6, 2))  # The twist at the first step, and its difference to the goal.
@@ -159,11 +162,11 @@ class TwistController:
         At full velocity the tool would leave the commanded direction, slide along the limit of its reach and return on
         another path. Instead it slows down as it misses the twist, and stops when it misses `MISSED_PART` of it.
         """
-        length = float(np.linalg.norm(self._goal))
+        length = float(np.linalg.norm(self._scale * self._goal))
         fastest = max(map(abs, desired))
         if length < _TWIST_TOLERANCE or fastest < _MIN_SPEED:
             return 1.0
-        missed = float(np.linalg.norm(self._goal - J.dot(inverse.dot(self._goal)))) / length
+        missed = float(np.linalg.norm(self._scale * (self._goal - J.dot(inverse.dot(self._goal))))) / length
         ahead = [angle + _LOOKAHEAD / fastest * v for angle, v in zip(q, desired, strict=True)]
         J_ahead, _ = tool_jacobian(self._chain, ahead, self._T_flange_tool)
         if np.linalg.eigvalsh(J_ahead.dot(J_ahead.T))[0] >= np.linalg.eigvalsh(J.dot(J.T))[0]:

@@ -113,19 +113,20 @@ class Sampling:
                     self._add_pose(section.at(0.0, near).pose)
                 q, pose = section.at(share, near)
             except KinematicsError as error:
-                self.refusal = refusal_of(error, share if self._reaches_end(near) else 1.0)
+                of_end = self._error_at_end(near)
+                self.refusal = refusal_of(error, share) if of_end is None else refusal_of(of_end, 1.0)
                 return
             self._add_pose(pose)
             self.refusal = find_outside(q, self._ends, share) or find_jump(near, q, share)
             self.rows.append(q)
 
-    def _reaches_end(self, near: Sequence[float]) -> bool:
-        """Returns whether the end of the section has joint angles."""
+    def _error_at_end(self, near: Sequence[float]) -> KinematicsError | None:
+        """Returns why the end of the section has no joint angles; None: it has."""
         try:
             self._section.at(1.0, near)
-        except KinematicsError:
-            return False
-        return True
+        except KinematicsError as error:
+            return error
+        return None
 
     def _add_pose(self, pose: Pose | None) -> None:
         if pose is None:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import cos, hypot, sin
+from math import cos, hypot, pi, sin
 from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
 from rcilab.core.arrays import Array
-from rcilab.core.errors import KinematicsError
+from rcilab.core.errors import KinematicsError, UnreachableError
 from rcilab.core.spatial import Pose, rotation_from_wxyz
+from rcilab.model.kinematics.solvers.newton import MOST_TURNED
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.blend import Blend
 from rcilab.motion.hermite import DIFFERENCE_STEP, State, central_state
@@ -61,7 +62,8 @@ class Section(Protocol):
 class PoseSolver:
     """The joint angles of a pose that are nearest to others. Owned by a planner.
 
-    A redundant arm moves its joints least, any other stays on its branch.
+    A redundant arm moves its joints least, any other stays on its branch. An arm with fewer than six joints reaches the
+    position, and the orientation almost (`MOST_TURNED`).
 
     Args:
         model: The arm with its tool.
@@ -69,7 +71,7 @@ class PoseSolver:
 
     def __init__(self, model: RobotModel) -> None:
         self._tracker = IkTracker(model)
-        self._is_redundant = bool(model.redundancy)
+        self._is_redundant, self._is_short = bool(model.redundancy), model.n < 6
         self._model = model
 
     def next_to(self, pose: Pose, near: Sequence[float]) -> list[float]:
@@ -79,8 +81,10 @@ class PoseSolver:
             KinematicsError: The pose is out of reach or singular.
         """
         try:
-            return self._tracker.follow(pose, near)
+            return self._tracker.aim(pose, near) if self._is_short else self._tracker.follow(pose, near)
         except KinematicsError:
+            if self._is_short:
+                return self.nearest(pose, near)
             q = self._tracker.approach(pose, near)  # A path may begin at a singularity, or pass through it.
             return self.nearest(pose, near) if q is None else q
 
@@ -88,7 +92,7 @@ class PoseSolver:
         """Returns the joint angles of any pose, [rad].
 
         A redundant joint, or the arm angle, stays that of `near` if the pose is within reach with it; otherwise the
-        joints move least on a straight line to the pose.
+        joints move least on a straight line to the pose. So do those of an arm with fewer than six.
 
         Raises:
             KinematicsError: The pose is out of reach or singular.
@@ -96,12 +100,24 @@ class PoseSolver:
         psi = self._model.arm_angle(near) if self._is_redundant else 0.0
         try:
             return self._tracker.solve(pose, psi, near)
-        except KinematicsError:
-            if not self._is_redundant:
+        except KinematicsError as error:
+            if not (self._is_redundant or self._is_short):
                 raise
+            try:
+                return self._along_line(pose, near)
+            except KinematicsError:
+                if isinstance(error, UnreachableError) and error.distance > 0.0:
+                    raise error from None
+                raise
+
+    def _along_line(self, pose: Pose, near: Sequence[float]) -> list[float]:
         line, q = build_line(self._model.forward(near), pose), list(near)
         for step in range(1, _LINE_STEPS + 1):
-            q = self._tracker.follow(line.at(step / _LINE_STEPS)[0], q)
+            between = line.at(step / _LINE_STEPS)[0]
+            if not self._is_short:
+                q = self._tracker.follow(between, q)
+            else:  # Only at the end the orientation counts.
+                q = self._tracker.aim(between, q, most_turned=MOST_TURNED if step == _LINE_STEPS else pi)
         return q
 
 

@@ -131,19 +131,21 @@ class ToolMover:
             try:
                 q = self._arm.solver.next_to(plan.at(share * plan.duration), q)
             except KinematicsError as error:
-                return refusal_of(error, share if self._reaches(plan.at(plan.duration)) else 1.0)
+                of_goal = self._error_at(plan.at(plan.duration))
+                return refusal_of(error, share) if of_goal is None else refusal_of(of_goal, 1.0)
             refusal = find_outside(q, self._ends, share)
             if refusal is not None:
                 return refusal
             rows.append(q)
         return rows
 
-    def _reaches(self, pose: Pose) -> bool:
+    def _error_at(self, pose: Pose) -> KinematicsError | None:
+        """Returns why a pose has no joint angles; None: it has."""
         try:
             self._arm.solver.nearest(pose, self._q)
-        except KinematicsError:
-            return False
-        return True
+        except KinematicsError as error:
+            return error
+        return None
 
     def _excess(self, plan: _PosePlan, rows: list[list[float]]) -> list[float]:
         """Returns by what factors velocity, acceleration and jerk exceed the joints' bounds; 1 where they do not.

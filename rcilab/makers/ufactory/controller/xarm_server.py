@@ -8,7 +8,7 @@ from traceback import extract_tb
 from rcilab.core.errors import DecodeError
 from rcilab.makers.ufactory.bounds import CLIENT_PORT
 from rcilab.makers.ufactory.controller.modbus_memory import ModbusRegisters
-from rcilab.makers.ufactory.controller.modes import State
+from rcilab.makers.ufactory.controller.modes import Mode, State
 from rcilab.makers.ufactory.controller.reporter import encode_report
 from rcilab.makers.ufactory.controller.request_handlers import Reply, RequestHandlers
 from rcilab.makers.ufactory.controller.tasks import Tasks
@@ -41,6 +41,7 @@ from rcilab.sim.virtual_arm import VirtualArm
 
 _PROTOCOL = "xArm protocol"
 _MOST_CLIENTS = 16  # Of one port; a tuning value.
+_STREAM_SILENCE = 1000  # Cycles without a motion after which a stream has ended in the log; a tuning value.
 _NOT_READY = (State.STOPPED, State.CHANGED)
 _FUNCTIONS = frozenset(Function)
 
@@ -80,6 +81,7 @@ class XArmServer:
         self._registers = ModbusRegisters(controller)
         self._link: ClientLink
         self._clients: set[Peer] = set()
+        self._stream_end: int | None = None  # Cycle at which a silent stream has ended.
         self._listeners: dict[ReportLayout, list[Peer]] = {layout: [] for layout in REPORTS}
         controller.on_task = self._handle_task
         controller.on_state = self._log_state
@@ -138,6 +140,8 @@ class XArmServer:
         """Advances by one cycle."""
         self.controller.step()
         self._handlers.io.step()
+        if self._stream_end is not None and self.controller.cycle_number >= self._stream_end:
+            self._log_end(self.controller.shown_state)
 
     def send_states(self) -> None:
         """Sends the reports that are due."""
@@ -202,10 +206,19 @@ class XArmServer:
         self._link.log("warning", f"{text}; report it with these bytes: {request.function} {request.payload.hex(' ')}")
 
     def _log_state(self, before: State, after: State) -> None:
+        controller = self.controller
         if after is State.MOVING:
-            self._link.log("motion_started", f"motion started in mode {self.controller.mode.value}")
-        elif before is State.MOVING:
-            self._link.log("motion_ended", f"motion ended; the state is {after.value} ({after.name.lower()})")
+            if self._stream_end is None:
+                self._link.log("motion_started", f"motion started in mode {controller.mode.value}")
+            self._stream_end = None
+        elif before is State.MOVING and after is State.READY and controller.mode is Mode.SERVO:
+            self._stream_end = controller.cycle_number + _STREAM_SILENCE
+        elif before is State.MOVING or self._stream_end is not None:
+            self._log_end(after)
+
+    def _log_end(self, state: State) -> None:
+        self._stream_end = None
+        self._link.log("motion_ended", f"motion ended; the state is {state.value} ({state.name.lower()})")
 
 
 def _report_channel(layout: ReportLayout, port: int) -> TcpChannel:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import radians
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +21,24 @@ _TOLERANCE = 1e-10  # [m] and [rad] Largest error of a solution.
 _SMALL_STEP = 1e-7  # [rad] Last step of `refine_near`, for the same reason.
 _LARGEST_STEP = 1.2  # [rad] A larger step of `refine_near` leaves its guess.
 _TOLERANCE_NEAR = 1e-12  # [m] and [rad] Largest error of a solution of `refine_near`.
+MOST_TURNED = radians(1.0)
+"""By how much the orientation on a path may differ on an arm with fewer than six joints, [rad]. A tuning value: it
+covers the tilt of a tool that was stopped on a line at 1 m/s."""
+OFF_POSITION = 1e-5
+"""By how much the position may differ there, [m]: rounding of a pose of single precision."""
+WEIGHTS = np.array((100.0, 100.0, 100.0, 1.0, 1.0, 1.0))
+"""Of position and orientation where such an arm reaches a pose only almost: the tool keeps its position."""
 
 
 def refine(
-    chain: Chain, held: int | None, rotations: Array, positions: Array, q: Array, *, slowly: bool = False
+    chain: Chain,
+    held: int | None,
+    rotations: Array,
+    positions: Array,
+    q: Array,
+    *,
+    slowly: bool = False,
+    is_path: bool = False,
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Returns joint angles near guesses for poses of the flange, by Newton's method.
 
@@ -34,6 +49,7 @@ def refine(
         positions: Flange in base, shape (M, 3), [m].
         q: Guesses, shape (M, n), [rad].
         slowly: Whether to iterate down to rounding, as required where two solutions almost coincide.
+        is_path: Whether an arm with fewer than six joints may miss the orientation by `MOST_TURNED`.
 
     Returns:
         Joint angles, shape (M, n), [rad], and whether each is a solution, shape (M,).
@@ -53,11 +69,20 @@ def refine(
         if not len(active):
             break
     _, pose_error = differential(chain, q, rotations, positions)
+    if is_path and len(free) < 6:
+        return q, _is_aimed(pose_error)
     return q, np.abs(pose_error).max(axis=1) < _TOLERANCE
 
 
 def refine_near(
-    chain: Chain, held: int | None, rotation: Array, position: Array, psi: float, guess: Sequence[float]
+    chain: Chain,
+    held: int | None,
+    rotation: Array,
+    position: Array,
+    psi: float,
+    guess: Sequence[float],
+    *,
+    is_path: bool = False,
 ) -> list[float] | None:
     """Returns the joint angles of one pose near a guess, n plain floats, [rad], or None without a solution.
 
@@ -68,6 +93,7 @@ def refine_near(
         position: Flange in base, shape (3,), [m].
         psi: Angle of the held joint, [rad].
         guess: Joint angles close to the solution, n plain floats, [rad].
+        is_path: As for `refine`.
     """
     q = [*guess]
     free = free_joints(chain, held)
@@ -77,9 +103,7 @@ def refine_near(
         J, _ = tool_jacobian(chain, q)
         pose_error = _pose_error(forward(chain, q), rotation, position)
         try:
-            step = (
-                np.linalg.solve(J[:, free], pose_error) if len(free) == 6 else np.linalg.pinv(J[:, free]) @ pose_error
-            )
+            step = np.linalg.solve(J[:, free], pose_error) if len(free) == 6 else solve_steps(J[:, free], pose_error)
         except np.linalg.LinAlgError:
             return None
         if np.abs(step).max() > _LARGEST_STEP:
@@ -88,13 +112,20 @@ def refine_near(
             q[joint] += step_angle
         if np.abs(step).max() < _SMALL_STEP:
             break
-    residual = np.abs(_pose_error(forward(chain, q), rotation, position)).max()
-    return q if residual < _TOLERANCE_NEAR else None
+    pose_error = _pose_error(forward(chain, q), rotation, position)
+    is_solved = np.abs(pose_error).max() < _TOLERANCE_NEAR or (is_path and len(free) < 6 and _is_aimed(pose_error))
+    return q if is_solved else None
 
 
 def free_joints(chain: Chain, held: int | None) -> list[int]:
     """Returns the indices of the joints that are not held."""
     return [joint for joint in range(len(chain)) if joint != held]
+
+
+def _is_aimed(pose_error: Array) -> NDArray[np.bool_]:
+    """Returns whether differences to poses, shape (..., 6), are those that fewer than six joints may leave."""
+    off, turned = np.abs(pose_error[..., :3]).max(axis=-1), np.linalg.norm(pose_error[..., 3:], axis=-1)
+    return np.asarray((off < OFF_POSITION) & (turned < MOST_TURNED))
 
 
 def _pose_error(current: Pose, rotation: Array, position: Array) -> Array:
@@ -137,9 +168,10 @@ def jacobians(chain: Chain, q: Array) -> tuple[Array, Array, tuple[Array, Array,
 
 
 def solve_steps(J: Array, pose_error: Array) -> Array:
-    """Returns the steps that J maps to the differences, shape (M, n); of least squares if they are not unique."""
-    if J.shape[1] != J.shape[2]:
-        return np.asarray((np.linalg.pinv(J) @ pose_error[..., None])[..., 0], dtype=np.float64)
+    """Returns the steps that J maps to the differences, shape (..., n); of least squares if they are not unique."""
+    if J.shape[-2] != J.shape[-1]:
+        inverse = np.asarray(np.linalg.pinv(WEIGHTS[:, None] * J), dtype=np.float64)
+        return (inverse @ (WEIGHTS * pose_error)[..., None])[..., 0]
     try:
         return np.asarray(np.linalg.solve(J, pose_error[..., None])[..., 0], dtype=np.float64)
     except np.linalg.LinAlgError:  # A Jacobian is exactly singular.

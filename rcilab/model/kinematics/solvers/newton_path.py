@@ -55,7 +55,7 @@ def follow_by_newton(
     guess = np.stack([np.interp(rows, solved_rows, column) for column in table.T], axis=1)
     if held is not None:
         guess[:, held] = psi
-    q, settled = refine(chain, held, rotations, positions, guess)
+    q, settled = refine(chain, held, rotations, positions, guess, is_path=True)
     q[solved_rows] = table
     settled[solved_rows] = True
     lost = ~settled
@@ -110,7 +110,8 @@ class _KnotSolver:
     def _solve_row(self, row: int, guess: list[float]) -> list[float] | None:
         """Returns the solution at a row near a guess, in plain floats, or None."""
         psi = float(self._psi[row])
-        return refine_near(self._chain, self._held, self._rotations[row], self._positions[row], psi, guess)
+        rotation, position = self._rotations[row], self._positions[row]
+        return refine_near(self._chain, self._held, rotation, position, psi, guess, is_path=True)
 
 
 def _reason(
