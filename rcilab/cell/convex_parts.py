@@ -13,6 +13,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from rcilab.cell.cell import Cell
 from rcilab.cell.shapes import MeshShape
 from rcilab.core.arrays import Array, readonly_copy
 from rcilab.core.atomic_file import replacing
@@ -41,6 +42,15 @@ def convex_parts(mesh: MeshShape) -> tuple[ConvexPart, ...]:
     parts = _decompose(mesh)
     _keep(file, parts)
     return parts
+
+
+def prepare_meshes(cell: Cell) -> None:
+    """Computes the convex parts of all meshes of a cell, unless they are known: it takes seconds for each."""
+    solids = () if cell.tool is None else cell.tool.solids_at()
+    held = () if cell.part is None else cell.part.solids
+    for shape in (*(obstacle.shape for obstacle in cell.obstacles), *(solid.shape for solid in (*solids, *held))):
+        if isinstance(shape, MeshShape):
+            convex_parts(shape)
 
 
 def _decompose(mesh: MeshShape) -> tuple[ConvexPart, ...]:

@@ -128,6 +128,7 @@ _SECTIONS: dict[str, dict[str, _Read]] = {
         "udp_port": _whole,
         "client": _text,
         "plant": _text,
+        "cell": _text,
         "realism": _text,
         "lockstep": as_flag,
         "mode_delay": _number,

@@ -10,11 +10,13 @@ import math
 import re
 from argparse import ArgumentParser, _ArgumentGroup
 from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rcilab.core.errors import InvalidValueError
 
 if TYPE_CHECKING:
+    from rcilab.cell.cell import Cell
     from rcilab.core.safety_box import SafetyBox
     from rcilab.core.spatial import Pose
     from rcilab.makers.configuration import SoftJointLimits
@@ -197,6 +199,18 @@ def parse_box(text: str, option: str = "--box") -> SafetyBox:
         return SafetyBox(size=size, T_base_box=T_base_box)
     except InvalidValueError as error:
         raise _named(error, option) from error
+
+
+def read_cell(file: str | Path | None) -> Cell | None:
+    """Returns the cell in the file of `--cell`; None without one.
+
+    Raises:
+        InvalidValueError: The file does not exist, or its cell is not valid; the message names the line.
+        VersionMismatchError: It has another version of this format.
+    """
+    from rcilab.cell.cell import Cell
+
+    return None if file is None else Cell.load(file)
 
 
 def parse_soft_limits(text: str, count: int, option: str = "--soft-limits") -> SoftJointLimits:

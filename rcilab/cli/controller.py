@@ -19,6 +19,7 @@ from rcilab.cli.arm_options import (
     parse_load,
     parse_soft_limits,
     parse_tool_and_load,
+    read_cell,
 )
 from rcilab.cli.output import print_interruptibly
 from rcilab.cli.signal_handlers import Handler, handled_signals
@@ -106,6 +107,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--realism",
         metavar="KIND",
         help="real: friction, noise and steps of the torque readings as on a real arm (off; xMate and mujoco only)",
+    )
+    parser.add_argument(
+        "--cell",
+        metavar="CELL",
+        help="file of the arm's cell (.json): its tool and load, in place of --tool and --load; with --plant mujoco "
+        "its floor and obstacles, the tool and the held part are solid",
     )
     parser.add_argument(
         "--lockstep",
@@ -283,7 +290,10 @@ def _config(options: Mapping[str, Any]) -> ControllerConfig:
     from rcilab.sim.controller_config import MOST_LOST, VENDOR_MODE_DELAY, ControllerConfig
 
     option = options.get
-    if "model" not in options:
+    cell = read_cell(option("cell"))
+    if cell is not None:
+        options = {"model": cell.model, **options}
+    elif "model" not in options:
         raise UsageError(
             "the arm is not named; add --model NAME, such as --model xMatePro7, or a file with its configuration"
         )
@@ -322,6 +332,7 @@ def _config(options: Mapping[str, Any]) -> ControllerConfig:
         start=_parsed(option("start"), lambda text: parse_joints(text, n)),
         tool=tool,
         load=load,
+        cell=cell,
         safety_box=_parsed(option("box"), parse_box),
         soft_limits=_parsed(option("soft_limits"), lambda text: _soft_limits(text, n)),
         inputs=_parsed(option("di", ()), _signals),

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.cell.cell import Cell
+from rcilab.cell.wire_rounding import without_rounding
 from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.start import StartState, as_start
 from rcilab.core.arrays import Unquoted
@@ -75,7 +76,8 @@ class Certificate:
             distance: Required distances of the links from each other and from the floor; None accepts those of the
                 check. A motion whose distances were not checked is refused.
             mode: Mode in which the motion will run; each mode has its own conditions.
-            cell: The cell of the arm. Without one, a motion that was checked in a cell is accepted too.
+            cell: The cell of the arm, whose tool and load the model must have but for the rounding of a controller's
+                interface. Without one, a motion that was checked in a cell is accepted too.
 
         Raises:
             CertificateError: Something differs from the check; `.changed` and the message name it.
@@ -83,6 +85,8 @@ class Certificate:
         """
         require_motion(motion)
         require_model(model)
+        if cell is not None:
+            model = without_rounding(model, cell)
         start = as_start(start_q, len(self.start_q)) if motion.n == len(self.start_q) else None
         current = {"motion": ""}
         if start is not None:
@@ -99,7 +103,7 @@ class Certificate:
         if self.parts.get("safety distance") == NOT_CHECKED and "safety distance" not in changed:
             changed.append("safety distance")
         if changed:
-            raise CertificateError(self._reason(changed, start, mode, model), changed)
+            raise CertificateError(self._reason(changed, start, mode, model, cell), changed)
 
     def __repr__(self) -> str:
         return f"<Certificate {self.digest[:8]} for motion {self.parts['motion'][:8]}>"
@@ -109,7 +113,9 @@ class Certificate:
         moved = StartState(np.array(self.start_q), start.dq, start.ddq)
         return bool(is_near) and self.parts["start state"] == _start_fingerprint(moved)
 
-    def _reason(self, changed: list[str], start: StartState | None, mode: Mode, model: RobotModel) -> str:
+    def _reason(
+        self, changed: list[str], start: StartState | None, mode: Mode, model: RobotModel, cell: Cell | None
+    ) -> str:
         if changed == ["start state"] and start is not None:
             offset = start.q - np.array(self.start_q)
             i = int(np.abs(offset).argmax())
@@ -145,23 +151,27 @@ class Certificate:
                 "again with that distance=..."
             )
         if changed[0] in _CONTROLLERS and changed[-1] in _CONTROLLERS:
-            return _describe_other_setup(changed, model)
+            return _describe_other_setup(changed, model, cell)
         what = " and ".join(filter(None, (", ".join(changed[:-1]), changed[-1])))
         verb = "has" if len(changed) == 1 else "have"
         return f"the certificate is stale: {what} {verb} changed since the motion was checked; check it again"
 
 
-def _describe_other_setup(changed: list[str], model: RobotModel) -> str:
+def _describe_other_setup(changed: list[str], model: RobotModel, cell: Cell | None) -> str:
     tool, load = model.T_flange_tool.position, model.load
     has = {
         "tool": f"tool at {', '.join(f'{1e3 * x:.6g}' for x in tool.tolist())} mm from the flange",
         "load": f"load of {load.mass:g} kg",
     }
     has_turn = "tool" in changed and not model.T_flange_tool.is_close(Pose(tool))
+    remedy = (
+        "check it with robot.model, or send what your model has: connect(..., apply=True)"
+        if cell is None
+        else "send those of the cell: robot.set_cell(cell, apply=True)"
+    )
     return (
         f"the motion was checked with another {' and '.join(changed)} than the arm has: a "
-        f"{' and a '.join(has[name] for name in changed)}{', turned' if has_turn else ''}; check it with robot.model, "
-        "or send what your model has: connect(..., apply=True)"
+        f"{' and a '.join(has[name] for name in changed)}{', turned' if has_turn else ''}; {remedy}"
     )
 
 

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import weakref
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from rcilab.control_process.launch import start_controller
+from rcilab.cell.cell import Cell, require_cell
+from rcilab.cell.convex_parts import prepare_meshes
+from rcilab.cell.tool import Tool
+from rcilab.control_process.launch import VirtualController, start_controller
 from rcilab.core.errors import ModelError
 from rcilab.execution.connect import open_session
 from rcilab.execution.session import RobotSession
@@ -30,6 +36,7 @@ def simulate(
     realism: str = "off",
     on_loss: str | None = None,
     prefill: int | None = None,
+    cell: Cell | None = None,
 ) -> RobotSession:
     """Returns a session with a simulated arm; the simulation ends when the session is closed or garbage-collected.
 
@@ -44,6 +51,8 @@ def simulate(
         on_loss: What the arm does while commands are missing: "hold" the last one, or "bridge" the gap; None: as the
             maker's arms, "hold" for an xMate.
         prefill: Cycles by which commands are played later; None: none in lock-step, else 10; torques 2 in both.
+        cell: The cell of the arm, see `RobotSession.set_cell`; its tool and load are those of the arm, and its floor
+            and obstacles are solid with the plant "mujoco".
 
     Raises:
         InvalidValueError: `model` is not a robot model, or another value is unknown, or the arm has no lock-step.
@@ -56,6 +65,9 @@ def simulate(
             "maker's client library"
         ).coded("no_driver", model=model.name)
     require_plant(plant, realism)
+    own = model
+    if cell is not None:
+        model = require_cell(cell).applied_to(own)
     capable = capabilities_of(model).options
     if lockstep:
         require_option("lockstep", lockstep, capable, model.name)
@@ -65,15 +77,17 @@ def simulate(
         options += ["--on-loss", require_loss_behaviour(on_loss)]
     if prefill is not None:
         options += ["--prefill", str(ControllerConfig(model=model.name, prefill=prefill).prefill)]
-    controller = start_controller(model.name, plant, lockstep, options)
+    controller = _start(own, plant, lockstep, options, cell)
     try:
         assert controller.address is not None  # Set by start_controller.
         session = open_session(
             controller.address,
             model,
             ANSWER_TIMEOUT,
-            apply=True,
+            apply=cell is None,
+            is_set_up=cell is not None,
             record_all=record_all,
+            cell=cell,
             realtime=not lockstep,
             state_timeout=STATE_TIMEOUT_IN_LOCKSTEP if lockstep else None,
             on_close=controller.end,
@@ -93,6 +107,20 @@ def simulate(
         raise
     weakref.finalize(session, controller.end)  # A notebook cell that runs again drops its earlier session.
     return session
+
+
+def _start(model: RobotModel, plant: str, lockstep: bool, options: list[str], cell: Cell | None) -> VirtualController:
+    """Returns a controller; one with a cell has its tool and load, or else those of the model, and the held part."""
+    if cell is None:
+        return start_controller(model.name, plant, lockstep, options)
+    if plant == "mujoco":
+        prepare_meshes(cell)  # Takes seconds once, for which its start does not wait.
+    if cell.tool is None:
+        cell = replace(cell, tool=Tool(T_flange_tool=model.T_flange_tool, payload=model.load))
+    with TemporaryDirectory(prefix="rcilab-") as folder:
+        file = Path(folder) / "cell.json"
+        cell.save(file)
+        return start_controller(model.name, plant, lockstep, [*options, "--cell", str(file)])
 
 
 def _world(address: str | None) -> SimulationControl | None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
+from rcilab.cell.cell import Cell, require_cell
 from rcilab.core.errors import InvalidValueError
 from rcilab.execution.control_loop import LOCAL_STATE_TIMEOUT, STATE_TIMEOUT
 from rcilab.execution.load_comparison import describe_other_load
@@ -30,6 +31,7 @@ def connect(
     *,
     apply: bool = False,
     record_all: bool = False,
+    cell: Cell | None = None,
 ) -> RobotSession:
     """Returns a session with the robot at an address. Nothing moves and no motor is switched.
 
@@ -47,6 +49,7 @@ def connect(
         timeout: Timeout of the connection, of the first state, and of every response, [s].
         apply: Whether the model's tool and load are sent to the controller.
         record_all: Whether runs store every field of the state, three times as much; see `Run.cycles`.
+        cell: The cell of the arm, see `RobotSession.set_cell`; its tool and load count as those of the model.
 
     Raises:
         ConnectionLostError: The robot does not respond, or states do not arrive; the message says what to check.
@@ -54,7 +57,7 @@ def connect(
         InvalidValueError: The address, the model or the timeout is not valid.
         MissingExtraError: The maker's client library is not installed.
     """
-    return open_session(address, model, timeout, apply=apply, record_all=record_all)
+    return open_session(address, model, timeout, apply=apply, record_all=record_all, cell=cell)
 
 
 def open_session(
@@ -64,6 +67,8 @@ def open_session(
     *,
     apply: bool = False,
     record_all: bool = False,
+    cell: Cell | None = None,
+    is_set_up: bool = False,
     realtime: bool = True,
     state_timeout: float | None = None,
     on_close: Callable[[], None] = lambda: None,
@@ -78,6 +83,8 @@ def open_session(
         timeout: [s].
         apply: As for `connect`.
         record_all: As for `connect`.
+        cell: As for `connect`.
+        is_set_up: Whether the controller was started with the tool and the load of the model.
         realtime: False for a controller in lock-step, which has no timing.
         state_timeout: Time without a state, while moving, that counts as a lost connection, [s]; None is
             `STATE_TIMEOUT`, or `LOCAL_STATE_TIMEOUT` for a controller on this machine, which pauses when the machine
@@ -87,6 +94,8 @@ def open_session(
         partner: Process id of a controller on this machine that is in lock-step with us; None: it is not.
     """
     require_timeout(timeout)
+    if cell is not None:
+        model = require_cell(cell).applied_to(load_model(cell.model) if model is None else model)
     if model is not None:
         require_driver(require_model(model))
     elif apply:
@@ -95,7 +104,7 @@ def open_session(
     try:
         if model is None:
             model = load_model(driver.arm_name)
-        if not apply:
+        if not (apply or is_set_up):
             model = driver.with_tool(model)
             if not driver.reports_load:
                 _warn_of_other_load(driver, model)
@@ -116,6 +125,7 @@ def open_session(
         session = RobotSession(driver, arm, lock, runner, world)
         if apply:
             session.configure(RobotConfiguration(tool=model.T_flange_tool, load=model.load))
+        session.set_cell(cell)
         return session
     except BaseException:
         driver.close()

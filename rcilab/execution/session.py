@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from rcilab.cell.cell import Cell, require_cell
 from rcilab.conformance.certificate import Certificate, require_certificate
 from rcilab.conformance.check import check
 from rcilab.conformance.free_elbow import resulting_motion
@@ -110,6 +111,7 @@ class RobotSession(Closeable):
         self._runner = runner
         self._simulation = simulation
         self._commands = driver.open_commands(arm, lock)
+        self._cell: Cell | None = None
         self._streamed: tuple[MotionStream, SpeedOverride[bool]] | None = None
         """Stream and speed override of the running `execute`."""
         with _sessions_lock:
@@ -145,6 +147,11 @@ class RobotSession(Closeable):
     def safety_box(self) -> SafetyBox | None:
         """The safety box of the tool, if set in this session; motions are checked with it."""
         return self._arm.safety_box
+
+    @property
+    def cell(self) -> Cell | None:
+        """The cell of the arm, if set in this session; motions are checked with it."""
+        return self._cell
 
     @property
     def address(self) -> str:
@@ -285,6 +292,26 @@ class RobotSession(Closeable):
         """Sets the safety box of the tool's origin, and whether it is active."""
         self.configure(RobotConfiguration(box=require_box(box)))
 
+    def set_cell(self, cell: Cell | None, *, apply: bool = False) -> None:
+        """Sets the cell that motions are checked with; they are refused while its tool or load is not the controller's.
+
+        Args:
+            cell: The cell of this arm; None: without one.
+            apply: Whether its tool, and the load of tool and held part, are sent to the controller.
+
+        Raises:
+            InvalidValueError: It is not a cell, or that of another arm.
+            CommandRejectedError: The controller refused tool or load; the cell is as before.
+            UsageError: A motion runs.
+        """
+        if cell is not None:
+            require_cell(cell).require_arm(self.model)
+            if apply:
+                carried = cell.applied_to(self.model)
+                self.configure(RobotConfiguration(tool=carried.T_flange_tool, load=carried.load))
+        with self._lock.acquire("set_cell"):
+            self._cell = cell
+
     def set_output(self, signal: int, level: bool) -> None:
         """Sets a digital output by its number, from 0."""
         require_feature(self.model, "signals")
@@ -327,7 +354,8 @@ class RobotSession(Closeable):
 
         Args:
             motion: The motion; it must begin at the commanded angles of the arm, `state.q_c`.
-            certificate: From an earlier `check(motion, model, mode=mode)`: only its validity is verified then.
+            certificate: From an earlier `check(motion, model, mode=mode, cell=robot.cell)`: then only its validity is
+                verified.
             progress: Called with time and duration about 20 times a second.
             mode: Command mode: the same motion as joint angles, as poses of the tool, or as torques.
             speed_override: Initial speed override, 0.1 to 1; `set_speed_override` changes it later.
@@ -353,7 +381,7 @@ class RobotSession(Closeable):
             if certificate is None:
                 self._require_allowed(motion, start, mode)
             else:
-                certificate.verify(motion, self.model, start, self.safety_box, mode=mode)
+                certificate.verify(motion, self.model, start, self.safety_box, mode=mode, cell=self.cell)
             motion = resulting_motion(motion, self.model, mode)
             scaled = plan_start_with_override(motion, speed_override, self.model, mode)
             planned = scaled.as_motion()
@@ -588,7 +616,10 @@ class RobotSession(Closeable):
         )
 
     def _require_allowed(self, motion: Motion, start: JointVector, mode: Mode = "joint_position") -> None:
-        check(motion, self.model, start=start, box=self.safety_box, mode=mode).require()
+        report = check(motion, self.model, start=start, box=self.safety_box, mode=mode, cell=self.cell).require()
+        if self.cell is not None:  # It was checked with the tool and the load of the cell.
+            assert report.certificate is not None
+            report.certificate.verify(motion, self.model, start, self.safety_box, mode=mode, cell=self.cell)
 
     def _move_along(
         self, path: Path, state: RobotState, speed: float, with_psi: bool, progress: Progress | None

@@ -37,7 +37,7 @@ def build_virtual_controller(
     config.require_options(options)
     arm = VirtualArm(
         model,
-        build_plant(config.plant, model, config.realism) if plant is None else plant,
+        build_plant(config.plant, model, config.realism, config.cell) if plant is None else plant,
         prefill=config.prefill_cycles,
         torque_prefill=config.torque_prefill_cycles,
         skips_torques=not config.lockstep,
@@ -48,7 +48,7 @@ def build_virtual_controller(
     server = maker.build_server(arm, config)
     if config.loop_back:
         server.controller.loop_back = True
-    setup = config.setup(tuple(model.home.tolist()))
+    setup = config.setup(model)
     if setup is not None:
         server.controller.set_up(setup)
     for signal in config.inputs:

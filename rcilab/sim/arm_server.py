@@ -185,6 +185,8 @@ class ArmServer:
             self._log.write("warning", text, host=self.host)
         if self._endpoint.warning:
             self._log.write("warning", self._endpoint.warning)
+        if self.config.cell is not None and self.controller.arm.plant.kind == "ideal":
+            self._log.write("warning", "the ideal plant has no contacts: the arm passes through the cell's obstacles")
         if self.config.realtime:
             warning = enter_realtime(PRIORITY if self._server.clocks_clients else _SLOWER_PRIORITY).warning
             if warning is not None and not self.config.lockstep:

@@ -52,8 +52,8 @@ def require_stand(model: RobotModel, q: Sequence[float], parameters: ArmParamete
         plant: With obstacles.
 
     Raises:
-        InvalidValueError: Not n finite numbers; a joint is outside its range; links overlap each other or a box of the
-            plant; or the tool is below the lower face of the active safety box.
+        InvalidValueError: Not n finite numbers; a joint is outside its range; links overlap each other or an obstacle
+            of the plant; or the tool is below the lower face of the active safety box.
     """
     angles = as_vector(q, model.n, JOINT_ANGLES, "rad")
     shown = [round(angle, 2) for angle in np.degrees(angles).tolist()]
@@ -70,7 +70,7 @@ def require_stand(model: RobotModel, q: Sequence[float], parameters: ArmParamete
         raise InvalidValueError(JOINT_ANGLES, shown, f"deg: {pair} overlap by {depth:.3g} mm; they must not touch")
     overlap = plant.find_overlap(angles)
     if overlap is not None:
-        raise InvalidValueError(JOINT_ANGLES, shown, f"deg: {overlap}; remove the box or choose other angles")
+        raise InvalidValueError(JOINT_ANGLES, shown, f"deg: {overlap}; remove it or choose other angles")
     box = parameters.safety_box
     if box is not None and box.active:
         tool = box.T_base_box.inverse() @ Pose(model.forward(angles).position)

@@ -6,11 +6,13 @@ from collections.abc import Collection
 from dataclasses import dataclass, field, fields, replace
 from typing import Literal, TypeAlias, get_args
 
+from rcilab.cell.cell import Cell
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.dynamics.payload import Payload
+from rcilab.model.robot_model import RobotModel
 from rcilab.sim.api import NetworkFaults, Stall
 from rcilab.sim.arm_parameters import Floats
 from rcilab.sim.arm_setup import ArmSetup
@@ -131,6 +133,9 @@ class ControllerConfig:
     """Pose of the tool in the flange frame, as set on the teach pendant; None: the flange."""
     load: Payload | None = None
     """Load at the flange, as set on the teach pendant; None: none."""
+    cell: Cell | None = None
+    """What the arm carries and what stands around it, in place of `tool` and `load`; solid in the MuJoCo plant. None:
+    neither."""
     safety_box: SafetyBox | None = None
     """Safety box, as set on the teach pendant; None: none."""
     soft_limits: tuple[Floats, Floats] | None = None
@@ -183,6 +188,10 @@ class ControllerConfig:
             raise InvalidValueError("patience", self.patience, "needs 0.01 to 3600 s, or 0 without lock-step")
         if self.prefill is not None and not 0 <= self.prefill <= 100:
             raise InvalidValueError("prefill", self.prefill, "needs 0 to 100 cycles")
+        if self.cell is not None and not (self.tool is None and self.load is None):
+            raise InvalidValueError(
+                "cell", self.cell.name or "it", "has the tool and the load of the arm: leave out other ones"
+            )
         if self.lost_limit is not None and not FEWEST_LOST <= self.lost_limit <= MOST_LOST:
             raise InvalidValueError(
                 "lost_limit",
@@ -205,19 +214,24 @@ class ControllerConfig:
             if value != defaults[name]:
                 require_option(name, value, options, self.model)
 
-    def setup(self, home: Floats) -> ArmSetup | None:
+    def setup(self, model: RobotModel) -> ArmSetup | None:
         """Returns the configuration of the arm; None if it is that after delivery.
 
         Args:
-            home: Joint angles for `start` of None, so that they are checked, too, shape (n,), [rad].
+            model: The arm, whose home pose stands for `start` of None, so that it is checked, too.
+
+        Raises:
+            InvalidValueError: The cell is that of another arm, or its load is too heavy.
         """
+        carried = None if self.cell is None else self.cell.applied_to(model)
         parts = ArmSetup(
             q=self.start,
-            T_flange_tool=self.tool,
-            load=self.load,
+            T_flange_tool=self.tool if carried is None else carried.T_flange_tool,
+            load=self.load if carried is None else carried.load,
             safety_box=self.safety_box,
             soft_limits=self.soft_limits,
         )
+        home = tuple(model.home.tolist())
         return None if parts.is_empty else replace(parts, q=home if self.start is None else self.start)
 
     @property

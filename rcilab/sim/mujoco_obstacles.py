@@ -1,4 +1,4 @@
-"""Obstacles of the MuJoCo plant: a floor, boxes, the walls of a safety box.
+"""Obstacles of the MuJoCo plant: a floor, boxes, the walls of a safety box; those of a cell, which do not change.
 
 A MuJoCo model has a fixed size, and compiling one takes many cycles of the controller. Therefore all geoms exist from
 the start, switched off; placing an obstacle sets the values of its geom.
@@ -12,10 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rcilab.cell.cell import Cell
 from rcilab.core.arrays import Array, as_vector
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.mujoco_cell import ALL, LINK, add_carried, add_obstacles
 
 MOST_BOXES = 16
 _FLOOR = "floor"
@@ -27,31 +30,41 @@ _MAX_CLEARING = 5.0  # [m] Larger than any arm.
 _DIRECTIONS = {
     "+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1),
 }  # fmt: skip
-_ARM, _SOLID = 1, 1  # Bits: `conaffinity` of the arm's geoms, `contype` of obstacles.
 
 
 class Obstacles:
-    """The obstacles of one arm. Owned by its plant; kept when another model is compiled."""
+    """The obstacles of one arm. Owned by its plant; kept when another model is compiled.
 
-    def __init__(self) -> None:
+    Args:
+        cell: The cell of the arm; None without one.
+    """
+
+    def __init__(self, cell: Cell | None = None) -> None:
+        self._cell = cell
+        self._placed: dict[str, list[str]] = {}
+        """Names of the geoms of each obstacle of the cell."""
         self._boxes: dict[str, tuple[float, float, float, Pose]] = {}
-        self._has_floor = False
+        height = None if cell is None else cell.floor_height
+        self._has_floor, self._floor = height is not None, height or 0.0
         self._walls: SafetyBox | None = None
         self._model: Any = None
 
     @property
     def is_empty(self) -> bool:
         """Whether there are no obstacles."""
-        return not (self._boxes or self._has_floor or self._walls)
+        return not (self._placed or self._boxes or self._has_floor or self._walls)
 
-    def add_to(self, spec: Any, mj: Any) -> None:
-        """Adds the geoms to an `MjSpec` and disables contact between the arm's own geoms."""
+    def add_to(self, spec: Any, mj: Any, model: RobotModel) -> None:
+        """Adds the geoms to the `MjSpec` of an arm and disables contact between the arm's own geoms."""
         for geom in spec.geoms:
-            geom.contype, geom.conaffinity = 0, _ARM
+            geom.contype, geom.conaffinity = 0, LINK
+        if self._cell is not None:
+            add_carried(spec, mj, self._cell, model)
+            self._placed = add_obstacles(spec, mj, self._cell)
         for names, kind in (((_FLOOR, *_WALLS), mj.mjtGeom.mjGEOM_PLANE), (_BOXES, mj.mjtGeom.mjGEOM_BOX)):
             for name in names:
                 size = [1.0, 1.0, 1.0]
-                spec.worldbody.add_geom(name=name, type=kind, size=size, contype=_SOLID, conaffinity=0, group=4)
+                spec.worldbody.add_geom(name=name, type=kind, size=size, contype=ALL, conaffinity=0, group=4)
 
     def install(self, model: Any, mj: Any) -> None:
         """Installs all obstacles in a compiled model."""
@@ -88,11 +101,15 @@ class Obstacles:
             raise
 
     def find_overlap(self, data: Any) -> str | None:
-        """Returns which link of the arm overlaps which box, as text; None if none does."""
-        for slot, name in zip(_BOXES, self._boxes, strict=False):
-            depth, link = self._deepest(int(self._model.geom(slot).id), data)
+        """Returns which link of the arm, or what it carries, overlaps what is solid, as text; None if none does."""
+        solids = [(f"the box {name!r}", slot) for slot, name in zip(_BOXES, self._boxes, strict=False)]
+        solids += [(f"the obstacle {name!r}", geom) for name, geoms in self._placed.items() for geom in geoms]
+        if self._cell is not None and self._has_floor:
+            solids.append(("the floor of the cell", _FLOOR))
+        for solid, geom in solids:
+            depth, link = self._deepest(int(self._model.geom(geom).id), data)
             if depth > 0.0:
-                return f"{link} overlaps the box {name!r} by {1e3 * depth:.3g} mm"
+                return f"{link} overlaps {solid} by {1e3 * depth:.3g} mm"
         return None
 
     def _require_free(self, name: str, data: Any) -> None:
@@ -116,13 +133,13 @@ class Obstacles:
             "box_overlap", name=name, link=link, axis=axis, depth=float(depth), way=distance
         )
 
-    def _deepest(self, box: int, data: Any) -> tuple[float, str]:
-        """Returns the depth of the deepest link in a box, [m], and its name; 0 or less if none overlaps."""
+    def _deepest(self, solid: int, data: Any) -> tuple[float, str]:
+        """Returns the depth of the deepest link in a solid, [m], and its name; 0 or less if none overlaps."""
         model, mj = self._model, self._mj
         mj.mj_kinematics(model, data)
         moves = model.body_weldid[model.geom_bodyid] != 0  # The base may stand in a table: neither of them moves.
-        links = np.flatnonzero((model.geom_conaffinity & _ARM != 0) & moves)
-        distances = [mj.mj_geomDistance(model, data, int(link), box, _NEAR, None) for link in links]
+        links = np.flatnonzero((model.geom_conaffinity & model.geom_contype[solid] != 0) & moves)
+        distances = [mj.mj_geomDistance(model, data, int(link), solid, _NEAR, None) for link in links]
         nearest = int(np.argmin(distances))
         return -distances[nearest], str(model.body(int(model.geom_bodyid[links[nearest]])).name)
 
@@ -147,7 +164,7 @@ class Obstacles:
         self._apply()
 
     def set_floor(self, on: bool) -> None:
-        """Adds or removes a solid floor at z = 0."""
+        """Adds or removes a solid floor at z = 0, or at the height of the cell's."""
         self._has_floor = on
         self._apply()
 
@@ -158,7 +175,7 @@ class Obstacles:
 
     def _apply(self) -> None:
         model, mj = self._model, self._mj
-        self._show(_FLOOR, self._has_floor, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+        self._show(_FLOOR, self._has_floor, (0.0, 0.0, self._floor), (1.0, 0.0, 0.0, 0.0))
         for slot, (position, wxyz) in zip(_WALLS, _faces(self._walls), strict=True):
             self._show(slot, self._walls is not None, position, wxyz)
         for slot in _BOXES[len(self._boxes) :]:
@@ -175,7 +192,7 @@ class Obstacles:
     def _show(self, name: str, on: bool, position: ArrayLike, wxyz: ArrayLike) -> int:
         model = self._model
         index = int(model.geom(name).id)
-        model.geom_contype[index] = _SOLID if on else 0
+        model.geom_contype[index] = ALL if on else 0
         model.geom_pos[index], model.geom_quat[index] = position, wxyz
         return index
 

@@ -31,6 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rcilab.cell.cell import Cell
 from rcilab.core.arrays import Array, JointVector, make_readonly, scalar
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
@@ -68,6 +69,7 @@ class MuJoCoPlant:
         model: The arm with its tool and load.
         friction: Scale of the viscous joint friction; 0: none.
         imperfections: Coulomb friction and torque sensors of the joints, n of them; None: neither.
+        cell: What the arm carries and what stands around it, which are solid; None: neither.
     """
 
     kind = "mujoco"
@@ -78,12 +80,13 @@ class MuJoCoPlant:
         *,
         friction: float = 1.0,
         imperfections: Sequence[JointImperfection] | None = None,
+        cell: Cell | None = None,
     ) -> None:
         self._friction_scale = friction
         self._coulomb = None if imperfections is None else np.array([joint.friction for joint in imperfections])
         self._sensors = None if imperfections is None else TorqueSensors(imperfections)
         self._mounted: Payload | None = None
-        self._obstacles = Obstacles()
+        self._obstacles = Obstacles(cell)
         self._build(model)
         self._push = Push(model, np.zeros(6))
         self._measurement = self.reset(model.home)
@@ -125,7 +128,7 @@ class MuJoCoPlant:
         self._is_stationary = False
 
     def find_overlap(self, q: JointVector) -> str | None:
-        """Returns which link would overlap which box with the arm at `q`; see `Plant.find_overlap`."""
+        """Returns which link would overlap what is solid with the arm at `q`; see `Plant.find_overlap`."""
         before = self._q.copy()
         self._q[:] = q
         try:
@@ -135,7 +138,7 @@ class MuJoCoPlant:
             self._mj.mj_kinematics(self._model, self._data)
 
     def set_floor(self, on: bool) -> None:
-        """Adds or removes a solid floor, the plane z = 0 of the base frame."""
+        """Adds or removes a solid floor; see `Plant.set_floor`."""
         self._obstacles.set_floor(on)
         self._is_stationary = False
 
@@ -254,7 +257,7 @@ class MuJoCoPlant:
         load = model.load if self._mounted is None else self._mounted
         text = build_mjcf(model.description, T_flange_tool=model.T_flange_tool, load=load, mounted=model.mounted)
         spec: Any = mj.MjSpec.from_string(text)
-        self._obstacles.add_to(spec, mj)
+        self._obstacles.add_to(spec, mj, model)
         self._mj, self._robot, self._n = mj, model, model.n
         self._model: Any = spec.compile()
         self._obstacles.install(self._model, mj)

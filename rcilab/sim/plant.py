@@ -135,11 +135,11 @@ class Plant(Protocol):
         ...
 
     def find_overlap(self, q: JointVector) -> str | None:
-        """Returns which link would overlap which box with the arm at `q`, shape (n,), [rad]; None if it is free."""
+        """Returns which link, tool or part would overlap which solid at `q`, shape (n,), [rad]; None if it is free."""
         ...
 
     def set_floor(self, on: bool) -> None:
-        """Adds or removes a solid floor, the plane z = 0 of the base frame.
+        """Adds or removes a solid floor, the plane z = 0 of the base frame, or the floor of the cell.
 
         Raises:
             UsageError: This plant does not simulate contact.

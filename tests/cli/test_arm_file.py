@@ -14,6 +14,7 @@ from rcilab.cli import main
 from rcilab.cli.arm_file import _SECTIONS, read_arm_file
 from rcilab.core.errors import InvalidValueError, RcilabError
 from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import load_model
 from rcilab.sim.api import NetworkFaults
 from rcilab.sim.controller_config import ControllerConfig
 
@@ -112,7 +113,7 @@ def test_the_command_line_takes_precedence_wherever_it_stands(
 def test_without_any_option_there_is_no_set_up(monkeypatch: pytest.MonkeyPatch) -> None:
     config = config_of("--model", "xMate3", monkeypatch=monkeypatch)
     assert config == ControllerConfig(model="xMate3", mode_delay=1.05, states_network=NetworkFaults(), is_recorded=True)
-    assert config.setup((0.0,) * 6) is None
+    assert config.setup(load_model(config.model)) is None
 
 
 def test_the_example_of_the_help_is_a_valid_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

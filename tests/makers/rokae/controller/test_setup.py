@@ -155,9 +155,7 @@ def test_an_arm_is_not_placed_inside_an_obstacle() -> None:
         before = place.cycle.step().q
         refused = place.handle(PlaceArm(Q))
         assert isinstance(refused, Refused)
-        assert re.search(
-            r"link\d overlaps the box 'wall' by \S+ mm; remove the box or choose other angles", refused.reason
-        )
+        assert re.search(r"link\d overlaps the box 'wall' by \S+ mm; remove it or choose other angles", refused.reason)
         place.step(5)
         assert np.array_equal(place.cycle.state.q, before)
     finally:
