@@ -110,7 +110,7 @@ class _Reader:
         self._name, self._find_mesh = name, find_mesh
 
     def read(self, root: Node, build: Callable[..., T]) -> T:
-        found = read_object(root, self._name, "a cell", _KEYS)
+        found = read_object(root, self._name, "a cell", _KEYS, "file_no_cell")
         for key in ("format", "version", "model"):
             if key not in found:
                 raise InvalidValueError(
@@ -119,7 +119,7 @@ class _Reader:
         if found["format"].value != FORMAT:
             raise InvalidValueError(
                 location(self._name, found["format"], "format"), found["format"].plain(), f"must be {FORMAT!r}"
-            )
+            ).coded("file_no_cell", file=self._name, line=found["format"].line)
         if found["version"].value != float(VERSION):
             what = location(self._name, found["version"], "version")
             raise VersionMismatchError(what, found["version"].plain(), VERSION, "the rcilab that wrote it reads it")
@@ -235,13 +235,12 @@ class _Reader:
             raise self._missing(node, what, "shape")
         kind = read_text(self._name, found["shape"], f"{what}, shape")
         if kind not in SHAPES:
-            raise InvalidValueError(
-                location(self._name, found["shape"], f"{what}, shape"), kind, f"is unknown; known: {', '.join(SHAPES)}"
-            )
+            unknown = InvalidValueError("shape", kind, f"is unknown; known: {', '.join(SHAPES)}")
+            raise located(unknown, self._name, found["shape"], f"{what}, ")
         for key in _SHAPE[1:]:
             if key in found and key not in _OF_SHAPE[kind]:
                 problem = f"has no meaning for a {kind}; it takes: {', '.join(_OF_SHAPE[kind]) or 'nothing'}"
-                raise InvalidValueError(location(self._name, found[key], f"{what}, {key}"), found[key].plain(), problem)
+                raise located(InvalidValueError(key, found[key].plain(), problem), self._name, found[key], f"{what}, ")
         for key in _OF_SHAPE[kind]:
             if key not in found and key != "scale":
                 raise self._missing(node, what, key)

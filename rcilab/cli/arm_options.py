@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rcilab.core.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError, UsageError
 
 if TYPE_CHECKING:
     from rcilab.cell.cell import Cell
@@ -49,6 +49,11 @@ def add_arm_options(parser: ArgumentParser | _ArgumentGroup) -> None:
     parser.add_argument(
         "--box", metavar=BOX_FORM, help="safety box: edges, and its centre in the base frame: 1,1,1@0.4,0,0.5"
     )
+
+
+def add_cell_option(parser: ArgumentParser | _ArgumentGroup, text: str) -> None:
+    """Adds `--cell`, with its help."""
+    parser.add_argument("--cell", metavar="CELL", help=f"file of the arm's cell (.json or .zip): {text}")
 
 
 def describe_arm(model: RobotModel, box: SafetyBox | None) -> str:
@@ -201,16 +206,25 @@ def parse_box(text: str, option: str = "--box") -> SafetyBox:
         raise _named(error, option) from error
 
 
-def read_cell(file: str | Path | None) -> Cell | None:
+def read_cell(file: str | Path | None, *others: object) -> Cell | None:
     """Returns the cell in the file of `--cell`; None without one.
 
+    Args:
+        file: Its name.
+        others: The values of `--tool` and `--load`, which are not given with a cell.
+
     Raises:
+        UsageError: One of them is given.
         InvalidValueError: The file does not exist, or its cell is not valid; the message names the line.
         VersionMismatchError: It has another version of this format.
     """
     from rcilab.cell.cell import Cell
 
-    return None if file is None else Cell.load(file)
+    if file is None:
+        return None
+    if any(value is not None for value in others):
+        raise UsageError("--cell has the tool and the load of the arm: leave out --tool and --load")
+    return Cell.load(file)
 
 
 def parse_soft_limits(text: str, count: int, option: str = "--soft-limits") -> SoftJointLimits:

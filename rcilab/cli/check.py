@@ -8,7 +8,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rcilab.cli.arm_options import add_arm_options, describe_arm, parse_box, parse_tool_and_load
+from rcilab.cli.arm_options import (
+    add_arm_options,
+    add_cell_option,
+    describe_arm,
+    parse_box,
+    parse_tool_and_load,
+    read_cell,
+)
 from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import show
 from rcilab.core.errors import InvalidValueError, RcilabError, UsageError
@@ -18,6 +25,7 @@ from rcilab.i18n.locale import LANGUAGES
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rcilab.cell.cell import Cell
     from rcilab.conformance.report import Report
     from rcilab.conformance.time_scaling import SlowDown
     from rcilab.core.safety_box import SafetyBox
@@ -47,6 +55,9 @@ def add_parser(subparsers: Any) -> None:
         help="arm, such as xMatePro7 (any case), or its file my_arm.json; default: that of the program or the run",
     )
     add_arm_options(parser)
+    add_cell_option(
+        parser, "checks distances from its obstacles, with its tool and load, in place of --tool and --load"
+    )
     parser.add_argument(
         "--slow-down",
         type=Path,
@@ -91,7 +102,9 @@ def _run(args: Namespace) -> int:
     if out is not None and os.path.realpath(out) == os.path.realpath(args.file):
         raise InvalidValueError("--slow-down", str(out), "is the file to check; choose another one")
     show_note = (lambda line: None) if args.json else show
-    subject = _read_run(args) if args.file.suffix.lower() == ".rcirun" else _read_motion(args)
+    cell = read_cell(args.cell, args.tool, args.load)
+    subject = _read_run(args) if args.file.suffix.lower() == ".rcirun" else _read_motion(args, cell)
+    subject = subject.in_cell(cell)
     model = subject.model
     report, to_slow = _check(subject, args, show_note)
     arm = describe_arm(model, subject.box)
@@ -120,12 +133,12 @@ def _check(subject: _Subject, args: Namespace, show_note: Callable[[str], None])
     from rcilab.recording.run import Run
     from rcilab.recording.sent_motion import check_sent, recorded_mode, with_stop
 
-    found, model, box, mode = subject.found, subject.model, subject.box, subject.mode
+    found, model, box, mode, cell = subject.found, subject.model, subject.box, subject.mode, subject.cell
     if not isinstance(found, Run):
         motion = as_motion(found, model, args.file, show=show_note, max_rows=args.max_rows)
-        report = check(motion, model, box=box, mode=mode)
+        report = check(motion, model, box=box, cell=cell, mode=mode)
         return report, report
-    report = check_sent(found, model, box=box, mode=mode)
+    report = check_sent(found, model, box=box, mode=mode, cell=cell)
     for note in report.motion.notes:
         show_note(f"note: {note}")
     is_refused = any(violation.condition.signal == "frame" for violation in report.violations)
@@ -136,7 +149,7 @@ def _check(subject: _Subject, args: Namespace, show_note: Callable[[str], None])
         before = report.motion.duration
         show_note(f"note: to slow it down, a stop of {motion.duration - before:.3f} s is added to the {before:.3f} s")
     start = None if found.truncated else report.start
-    return report, check(motion, model, start=start, box=box, mode=mode)
+    return report, check(motion, model, start=start, box=box, cell=cell, mode=mode)
 
 
 _COMMAND_COLUMN, _LONGEST_HEADER = b"command[1]", 65536
@@ -154,16 +167,33 @@ class _Subject:
     model: RobotModel
     box: SafetyBox | None
     mode: Mode
+    cell: Cell | None = None
     note: str = ""
 
+    def in_cell(self, cell: Cell | None) -> _Subject:
+        """Returns the same in a cell, with a note if its tool or load are not those of the file."""
+        from rcilab.cell.wire_rounding import without_rounding
+        from rcilab.core.spatial import IDENTITY
 
-def _read_motion(args: Namespace) -> _Subject:
+        if cell is None:
+            return self
+        model, notes = cell.applied_to(self.model), [self.note] if self.note else []
+        carries = not self.model.T_flange_tool.is_close(IDENTITY) or self.model.load.mass
+        if carries and without_rounding(self.model, cell).fingerprint != model.fingerprint:
+            notes.append("the file has another tool or load than the cell; those of the cell count")
+        return replace(self, model=model, cell=cell, note="; ".join(notes))
+
+
+def _read_motion(args: Namespace, cell: Cell | None) -> _Subject:
     from rcilab.model.robot_model import load_model
     from rcilab.motion import Program
     from rcilab.motion.program import box_numbers, payload_numbers, tool_numbers
 
     found = read_file(args.file, args.max_rows)
-    named = found.model if isinstance(found, Program) and args.model is None else args.model
+    model_name = args.model
+    if cell is not None and args.model is None and not isinstance(found, Program):
+        model_name = cell.model
+    named = found.model if isinstance(found, Program) and args.model is None else model_name
     tool, load, box = _arm_options(args, named)
     if isinstance(found, Program):
         found = replace(
@@ -174,10 +204,10 @@ def _read_motion(args: Namespace) -> _Subject:
         )
         model = found.applied_to(load_model(found.model if args.model is None else args.model))
         box = found.safety_box
-    elif args.model is None:
+    elif model_name is None:
         raise UsageError("a motion file does not name its arm: add --model NAME, such as --model xMatePro7")
     else:
-        model = load_model(args.model, tool=tool, load=load)
+        model = load_model(model_name, tool=tool, load=load)
         if found.n != model.n and args.file.suffix.lower() == ".csv":
             problem = f"has {found.n} joints after the time, {model.name} has {model.n}; is there a column t [s]?"
             raise InvalidValueError("motion file", args.file.name, problem)

@@ -14,6 +14,7 @@ from rcilab.cli.arm_options import (
     JOINTS_FORM,
     SOFT_LIMITS_FORM,
     add_arm_options,
+    add_cell_option,
     parse_box,
     parse_joints,
     parse_load,
@@ -108,11 +109,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         metavar="KIND",
         help="real: friction, noise and steps of the torque readings as on a real arm (off; xMate and mujoco only)",
     )
-    parser.add_argument(
-        "--cell",
-        metavar="CELL",
-        help="file of the arm's cell (.json): its tool and load, in place of --tool and --load; with --plant mujoco "
-        "its floor and obstacles, the tool and the held part are solid",
+    add_cell_option(
+        parser,
+        "its tool and load, in place of --tool and --load; with --plant mujoco its floor and obstacles, the tool and "
+        "the held part are solid",
     )
     parser.add_argument(
         "--lockstep",
@@ -290,7 +290,7 @@ def _config(options: Mapping[str, Any]) -> ControllerConfig:
     from rcilab.sim.controller_config import MOST_LOST, VENDOR_MODE_DELAY, ControllerConfig
 
     option = options.get
-    cell = read_cell(option("cell"))
+    cell = read_cell(option("cell"), option("tool"), option("load"))
     if cell is not None:
         options = {"model": cell.model, **options}
     elif "model" not in options:

@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
+from rcilab.cli.arm_options import add_cell_option, read_cell
 from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import drop_output, drop_unread_output, show
 from rcilab.cli.signal_handlers import handled_signals
@@ -29,6 +30,7 @@ from rcilab.core.errors import (
 from rcilab.core.fault import name_faults
 
 if TYPE_CHECKING:
+    from rcilab.cell.cell import Cell
     from rcilab.conformance.certificate import Certificate
     from rcilab.conformance.report import Report
     from rcilab.core.arrays import JointVector
@@ -70,8 +72,10 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--apply",
         action="store_true",
-        help="first send tool, load and safety box of the program to the controller; without it, reports what differs",
+        help="first send tool, load and safety box of the program, or tool and load of the cell, to the controller; "
+        "without it, reports what differs",
     )
+    add_cell_option(parser, "checks distances from its obstacles, with its tool and load; --apply sends these")
     parser.add_argument("--yes", action="store_true", help="do not ask; for scripts that have asked before")
     parser.add_argument(
         "--json",
@@ -168,13 +172,13 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
             raise InvalidValueError("--save", str(args.save), "is in a folder that does not exist")
     found = read_file(args.file, args.max_rows)
     model = load_model(args.model) if args.model else None
-    box = None
+    box, cell = None, read_cell(args.cell)
     if isinstance(found, Program):
         model, box = found.applied_to(model or load_model(found.model)), found.safety_box
-    elif args.apply:
+    elif args.apply and cell is None:
         raise UsageError("--apply sends tool, load and safety box of a program, and a motion file has none")
     show_note = partial(print, file=_text_stream(args))
-    with _connect(args, model, show_note) as robot:
+    with _connect(args, model, cell, show_note) as robot:
         if box is not None and args.apply:
             robot.set_safety_box(box)
         motion = as_motion(found, robot.model, args.file, show=show_note, max_rows=args.max_rows)
@@ -191,7 +195,7 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
             motions = [motion]
         else:
             motions = [*_plan_to_start(motion, robot, state.q_c), motion]
-            report = check(motion, robot.model, start=motion.q[0], box=box)
+            report = check(motion, robot.model, start=motion.q[0], box=box, cell=cell)
             if not report.ok:  # Known before the arm moves to its start.
                 moves.append(_refuse(report, args))
                 motions = []
@@ -204,15 +208,17 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
         return robot.model.name
 
 
-def _connect(args: Namespace, model: RobotModel | None, report: Callable[[str], None]) -> RobotSession:
+def _connect(
+    args: Namespace, model: RobotModel | None, cell: Cell | None, report: Callable[[str], None]
+) -> RobotSession:
     """Returns a session; reports what differs from the model's tool and load."""
     from rcilab.execution.connect import connect
 
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
-        robot = connect(args.robot, model, args.timeout, apply=args.apply)
+        robot = connect(args.robot, model, args.timeout, apply=args.apply, cell=cell)
     for warning in found:
-        report(f"note: {warning.message}; rcilab run --apply sends tool, load and safety box of the program")
+        report(f"note: {warning.message}; rcilab run --apply sends tool, load and safety box")
     return robot
 
 
@@ -291,7 +297,7 @@ def _move(
 
     out = _text_stream(args)
     start = commanded_start(motion.q[0], robot.state.q_c, robot.model)
-    report = check(motion, robot.model, start=start, box=box)
+    report = check(motion, robot.model, start=start, box=box, cell=robot.cell)
     if not report.ok:
         moves.append(_refuse(report, args))
         return

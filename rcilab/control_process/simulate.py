@@ -118,7 +118,7 @@ def _start(model: RobotModel, plant: str, lockstep: bool, options: list[str], ce
     if cell.tool is None:
         cell = replace(cell, tool=Tool(T_flange_tool=model.T_flange_tool, payload=model.load))
     with TemporaryDirectory(prefix="rcilab-") as folder:
-        file = Path(folder) / "cell.json"
+        file = Path(folder) / "cell.zip"
         cell.save(file)
         return start_controller(model.name, plant, lockstep, [*options, "--cell", str(file)])
 

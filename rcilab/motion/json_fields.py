@@ -11,7 +11,7 @@ from rcilab.motion.located_json import Node
 _EXCERPT_LENGTH = 40  # [characters] Of a value in an error message.
 
 
-def read_object(node: Node, name: str, kind: str, keys: Sequence[str]) -> dict[str, Node]:
+def read_object(node: Node, name: str, kind: str, keys: Sequence[str], code: str = "file_kind") -> dict[str, Node]:
     """Returns the entries of an object that has no other keys than these.
 
     Args:
@@ -19,13 +19,14 @@ def read_object(node: Node, name: str, kind: str, keys: Sequence[str]) -> dict[s
         name: Name of the file.
         kind: What the object is, such as "a program".
         keys: Allowed keys.
+        code: Of the error for something else.
 
     Raises:
         InvalidValueError: It is not an object, or has another key.
     """
     if not isinstance(node.value, dict):
         raise InvalidValueError(f"{name}, line {node.line}", node.plain(), f"must be {kind}: an object {{...}}").coded(
-            "file_no_program", file=name, line=node.line
+            code, file=name, line=node.line, key=kind
         )
     for key, value in node.value.items():
         if key not in keys:

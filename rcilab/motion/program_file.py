@@ -95,7 +95,7 @@ def read_program(content: bytes, name: str, build: Callable[..., P]) -> P:
         except InvalidValueError as error:
             raise located(error, name, Node([], too_long.line)) from error
         raise
-    found = read_object(root, name, "a program", _PROGRAM_KEYS)
+    found = read_object(root, name, "a program", _PROGRAM_KEYS, "file_no_program")
     for key, expected in (("format", FORMAT), ("version", float(VERSION))):
         if key not in found:
             raise InvalidValueError(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rcilab.cell.cell import Cell
 from rcilab.conformance.advice import with_degrees
 from rcilab.conformance.check import check_commands, check_torques
 from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE, condition_table
@@ -112,6 +113,7 @@ def check_sent(
     box: SafetyBox | None = None,
     distance: ClearanceLimit | None = STANDARD_DISTANCE,
     mode: Mode | None = None,
+    cell: Cell | None = None,
 ) -> Report:
     """Returns the check of what a client commanded in a run, up to its last command, or one that was refused.
 
@@ -121,6 +123,7 @@ def check_sent(
         box: The safety box; None: that of the run.
         distance: Required distances of the links; None does not check them.
         mode: The mode; None: that of the run.
+        cell: The cell of the arm; None without one.
 
     Raises:
         InvalidValueError: The run does not name its arm, or an argument is not valid for it.
@@ -128,31 +131,38 @@ def check_sent(
     """
     model = with_soft_limits(require_model(run.model), run) if model is None else require_model(model)
     box = run.setup.safety_box if box is None else box
-    report = _check(run, model, box, distance, mode)
+    report = _check(run, model, box, distance, mode, cell)
     if not (run.has_playout and run.faults and report.ok):
         return report
-    parallel = _check_parallel_motion(run, model, box, distance)
+    parallel = _check_parallel_motion(run, model, box, distance, cell)
     return explain_stop(report, run, model) if parallel is None or parallel.ok else parallel
 
 
 def _check_parallel_motion(
-    run: Run, model: RobotModel, box: SafetyBox | None, distance: ClearanceLimit | None
+    run: Run, model: RobotModel, box: SafetyBox | None, distance: ClearanceLimit | None, cell: Cell | None
 ) -> Report | None:
     """Returns the check of the motion that a client commanded along with torques; None without one."""
     fields = (*_TOOL_FIELDS, *_JOINT_FIELDS)
     if recorded_mode(run) != "torque" or not any(bool(np.isfinite(run.cycles[name]).any()) for name in fields):
         return None
-    return _check(replace(run, setup=replace(run.setup, mode="joint_position")), model, box, distance, None)
+    return _check(replace(run, setup=replace(run.setup, mode="joint_position")), model, box, distance, None, cell)
 
 
 def _check(
-    run: Run, model: RobotModel, box: SafetyBox | None, distance: ClearanceLimit | None, mode: Mode | None
+    run: Run,
+    model: RobotModel,
+    box: SafetyBox | None,
+    distance: ClearanceLimit | None,
+    mode: Mode | None,
+    cell: Cell | None,
 ) -> Report:
     recorded = recorded_mode(run)
     if recorded == "torque":
         motion, torques, not_finite = _read_torques(run)
         motion, start = _in_progress(motion) if run.truncated else (_with_duration(motion, run), None)
-        report = check_torques(motion, torques[-len(motion) :], model, start=start, box=box, distance=distance)
+        report = check_torques(
+            motion, torques[-len(motion) :], model, start=start, box=box, distance=distance, cell=cell
+        )
         return _with_broken(report, model, "torque", not_finite)
     sent = read_sent(run)
     motion = sent.motion
@@ -167,7 +177,7 @@ def _check(
     ) -> Report:
         motion = replace(motion, notes=(*motion.notes, *note))
         given = mode or recorded
-        report = check_commands(motion, model, record, start=start, box=box, distance=distance, mode=given)
+        report = check_commands(motion, model, record, start=start, box=box, distance=distance, cell=cell, mode=given)
         names = run.cycles.dtype.names or ()
         order = int("command_dq" in names and np.isfinite(run.cycles["command_dq"]).any())  # Velocities, or positions.
         return _with_broken(report, model, "joint", sent.not_finite, order)
