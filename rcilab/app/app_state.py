@@ -21,6 +21,7 @@ from rcilab.sim.controller_config import PlantKind
 
 if TYPE_CHECKING:
     from rcilab.app.run.recording import Recording
+    from rcilab.cell.cell import Cell
     from rcilab.motion.motion import Motion
 
 
@@ -91,4 +92,8 @@ class AppState:
     @property
     def box(self) -> SafetyBox | None:
         """The safety box that plans are checked with."""
+        return None
+
+    def cell_for(self, model: RobotModel) -> Cell | None:
+        """Returns the cell that plans for an arm are checked in, with its tool and load; None without one."""
         return None

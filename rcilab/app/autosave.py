@@ -1,4 +1,4 @@
-"""Restores the last workbench's program, configuration and view settings; after a crash the goal, too."""
+"""Restores the last workbench's program, configuration, cell and view settings; after a crash the goal, too."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from rcilab.app.cell.cell_backup import CellBackup
 from rcilab.app.setup.configuration_json import build_setup, setup_facts
 from rcilab.core.arrays import JointVector, as_vector, readonly_copy
 from rcilab.core.atomic_file import read_own_text, write_atomic
@@ -20,6 +21,7 @@ from rcilab.motion.program import Program
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
+    from rcilab.cell.cell import Cell
     from rcilab.model.robot_model import RobotModel
 
 _FORMAT, _VERSION = "rcilab workbench", 1
@@ -37,6 +39,7 @@ class SavedState:
     program: Program | None = None
     setup: RobotConfiguration = field(default_factory=RobotConfiguration)
     """The edited parts of the configuration."""
+    cell: Cell | None = None
 
 
 def looks_of(state: UiState) -> dict[Look, str]:
@@ -58,7 +61,7 @@ def autosave_file(port: int) -> Path:
 
 
 class Autosave:
-    """Writes the view settings, and goal, program and configuration of every arm, when they have changed.
+    """Writes the view settings, and goal, program, configuration and cell of every arm, when they have changed.
 
     Owned by the dispatcher's thread.
 
@@ -70,6 +73,7 @@ class Autosave:
 
     def __init__(self, file: Path | None) -> None:
         self._file = file
+        self._cells = None if file is None else CellBackup(file.with_suffix(".meshes"))
         self._arms: dict[str, Any] = {}
         self._looks: dict[Look, str] = {}
         self._written: tuple[object, ...] | None = None
@@ -92,7 +96,7 @@ class Autosave:
             q = None if own.get("q") is None else readonly_copy(as_vector(own["q"], model.n, "q", "rad"))
             setup = build_setup(own.get("setup") or {})
             setup.applied_to(model)  # A load above the arm's payload is not restored.
-            return SavedState(q=q, program=program, setup=setup)
+            return SavedState(q=q, program=program, setup=setup, cell=self._cell_of(own))
         except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError, RcilabError):
             return None
 
@@ -120,6 +124,20 @@ class Autosave:
                     found.append(Program.from_json(own["program"]))
         return tuple(found)
 
+    def recall_cells(self, model: RobotModel) -> tuple[Cell, ...]:
+        """Returns the cells of the other arms; after `recall`."""
+        found: list[Cell] = []
+        for name, own in self._arms.items():
+            with suppress(ValueError, LookupError, TypeError, AttributeError, RecursionError, RcilabError):
+                cell = self._cell_of(own)
+                if name != model.name and cell is not None:
+                    found.append(cell)
+        return tuple(found)
+
+    def _cell_of(self, own: dict[str, Any]) -> Cell | None:
+        text = own.get("cell")
+        return None if text is None or self._cells is None else self._cells.cell_of(text)
+
     def keep(self, state: UiState) -> None:
         """Writes changes, at most once a second."""
         now = time.monotonic()
@@ -129,6 +147,7 @@ class Autosave:
             state.program.draft,
             state.setup.wanted,
             state.setup.touched,
+            state.cell.cell,
             (looks := looks_of(state)),
         )
         if self._file is None or content == self._written or now < self._next:
@@ -143,24 +162,28 @@ class Autosave:
         }
         self._looks = looks
         with suppress(OSError):
+            if state.cell.cell is not None and self._cells is not None:
+                self._arms[state.model.name]["cell"] = self._cells.text_of(state.cell.cell)
             self._write(self._arms)
 
     def close(self, state: UiState) -> None:
-        """Forgets goals, at a regular end of the workbench. Programs, configurations and view settings are kept."""
+        """Forgets goals, at a regular end of the workbench; all else is kept."""
         if self._file is None:
             return
         self._next = 0.0
         self.keep(state)
         arms = {
-            name: {"program": own.get("program"), "setup": own.get("setup") or {}}
+            name: {"program": own.get("program"), "setup": own.get("setup") or {}, "cell": own.get("cell")}
             for name, own in self._arms.items()
-            if own.get("program") or own.get("setup")
+            if own.get("program") or own.get("setup") or own.get("cell")
         }
         with suppress(OSError):
             if arms or self._looks:
                 self._write(arms)
             else:
                 self._file.unlink(missing_ok=True)
+        if self._cells is not None:
+            self._cells.clean()
 
     def _write(self, arms: dict[str, Any]) -> None:
         assert self._file is not None

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Generic, TypeVar
 
 from rcilab.app.autosave import Autosave, SavedState
+from rcilab.app.cell.cell_actions import CellActions
 from rcilab.app.check.check_actions import CheckActions
 from rcilab.app.connection import PageConnection
 from rcilab.app.control_lock import ClientHeartbeat
@@ -33,7 +34,7 @@ from rcilab.app.run.watch_actions import WatchActions
 from rcilab.app.run.world_actions import WorldActions
 from rcilab.app.scene.scene_actions import SceneActions
 from rcilab.app.setup.configuration_state import name_parts
-from rcilab.app.setup.setup_actions import SetupActions, is_setup_field
+from rcilab.app.setup.setup_actions import OpenTab, SetupActions, is_setup_field
 from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store
 from rcilab.app.view_actions import DrawInSoftware, SetView, ViewActions
@@ -110,6 +111,7 @@ class Dispatcher:
         self._signals = SignalActions(store, connection, self.run.requests)
         self._push = PushActions(store, connection)
         self._setup = SetupActions(store, connection)
+        self._cell = CellActions(store, self._setup)
         self._jog = JogActions(store, connection, self._goal)
         self._poses = NamedPoseActions(store, self._goal)
         self._program = ProgramActions(store, connection, self._goal)
@@ -129,12 +131,17 @@ class Dispatcher:
         self.errors = Failures()
         """Failures of our own code; at most one a second is printed and shown on the page."""
         features = (
-            self._goal, self._poses, self._scene, self._setup, self._jog, self._push, self._program,
+            self._goal, self._poses, self._scene, self._setup, self._cell, self._jog, self._push, self._program,
             self._program.editing, self._check, self._learn, self.run, self._target_robot, self._mode, self._world,
             self._signals, self._view, self._export, self._folder, self._control_lock,
         )  # fmt: skip
         self._handlers = {kind: act for feature in features for kind, act in feature.handlers.items()}
-        self._handlers |= {TypeField: self._type_field, RobotCommand: self._drive, Refuse: self._refuse}
+        self._handlers |= {
+            TypeField: self._type_field,
+            OpenTab: self._open_tab,
+            RobotCommand: self._drive,
+            Refuse: self._refuse,
+        }
 
     def ask(self, request: Request) -> None:
         """Takes a request and returns at once; callable from any thread."""
@@ -158,6 +165,8 @@ class Dispatcher:
             self.run.remember_setup(name, setup)
         for program in self._autosave.recall_programs(self._store.state.model):
             self._program.lay_aside(program)
+        for cell in self._autosave.recall_cells(self._store.state.model):
+            self._cell.restore(cell)
 
     def start(self) -> None:
         """Starts the thread."""
@@ -202,6 +211,7 @@ class Dispatcher:
         if self._watch is not None:
             self._watch.tick()
         event = self.run.watch()
+        self._cell.tick()
         # The plan may already exist when the status arrives.
         if event == "arm_known" and self._store.state.plan is None:
             self._goal.plan()
@@ -225,8 +235,11 @@ class Dispatcher:
 
     def _resume(self, kept: SavedState) -> None:
         back: list[str] = [] if kept.program is None else ["program"]
+        back += [] if kept.cell is None else ["cell"]
         back += kept.setup.parts
         self._setup.restore(kept.setup)
+        if kept.cell is not None:
+            self._cell.restore(kept.cell)
         if kept.q is not None:
             self._goal.set_joints(kept.q)
         if kept.program is not None and kept.program.model == self._store.state.model.name:
@@ -259,9 +272,17 @@ class Dispatcher:
         else:
             self.run.drive(request)
 
+    def _open_tab(self, request: OpenTab) -> None:
+        """Only the open tab has handles in the scene."""
+        self._setup.open_tab(request)
+        if request.name != "tab.cell":
+            self._cell.deselect()
+
     def _type_field(self, request: TypeField) -> None:
         if is_setup_field(request.field):
             self._setup.type_field(request)
+        elif request.field.startswith("cell."):
+            self._cell.type_field(request)
         elif request.field.startswith("control."):
             self._mode.type_field(request)
         elif request.field.startswith("program."):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from rcilab.cell.cell import Cell
 from rcilab.conformance.check import check
 from rcilab.conformance.free_elbow import resulting_motion
 from rcilab.core.arrays import Array, JointVector
@@ -44,6 +45,8 @@ class Plan:
     """The arm it was checked for, with its tool and load."""
     box: SafetyBox | None = None
     """The safety box it was checked with."""
+    cell: Cell | None = None
+    """The cell it was checked in, with the tool and the load of `model`."""
     path: Array = field(repr=False)
     """Positions of the tool, shape (N, 3), [m]."""
     effort: Array = field(repr=False)
@@ -80,20 +83,25 @@ class Plan:
         """Joint angles at which it must be executed, [rad]."""
         return self.motion.start
 
-    def completed(self, mode: Mode = "joint_position") -> Plan:
-        """Returns this plan with a report on all conditions of a mode, with collisions, as execution requires it."""
-        if self.complete and self.mode == mode:
+    def completed(self, mode: Mode = "joint_position", cell: Cell | None = None) -> Plan:
+        """Returns this plan with a report on all conditions of a mode, with collisions, as execution requires it.
+
+        Args:
+            mode: The mode.
+            cell: The cell, with the tool and the load of `model`.
+        """
+        if self.complete and self.mode == mode and self.cell is cell:
             return self
         planned = self.as_planned
         motion = resulting_motion(planned, self.model, mode)
         if len(motion) < len(planned):
             motion = planned  # The report names the pose that is out of reach.
-        report = check(motion, self.model, box=self.box, mode=mode)
+        report = check(motion, self.model, box=self.box, cell=cell, mode=mode)
         if motion is self.motion:
-            return replace(self, report=report, mode=mode, complete=True)
+            return replace(self, report=report, cell=cell, mode=mode, complete=True)
         drawn = build_plan_view(self.model, motion, report, self.box)
         of_mode = replace(self, motion=motion, report=report, path=drawn.path, effort=drawn.effort)
-        return replace(of_mode, mode=mode, complete=True, planned=None if motion is planned else planned)
+        return replace(of_mode, cell=cell, mode=mode, complete=True, planned=None if motion is planned else planned)
 
     def stale_parts(self, model: RobotModel, box: SafetyBox | None) -> tuple[str, ...]:
         """Returns what has changed since the plan was checked, as in certificates: tool, load, joint limits, box.

@@ -37,7 +37,8 @@ class TypeField(Request):
     """The text of a number field; the part of its name before the first dot names the feature."""
 
     field: str
-    """joint.0 ..., pose.x ..., psi, speed, program.KEY.speed ..., setup.PART.NAME (see `setup/setup_fields.py`)."""
+    """joint.0 ..., pose.x ..., psi, speed, program.KEY.speed ..., setup.PART.NAME (see `setup/setup_fields.py`),
+    cell.INDEX.NAME (see `cell/cell_actions.py`)."""
     text: str
 
 

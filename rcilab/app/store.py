@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
 from rcilab.app.app_state import AppState
+from rcilab.app.cell.cell_state import CellState, checked_cell
 from rcilab.app.check.check_state import CheckState
 from rcilab.app.control_lock import ControlLock
 from rcilab.app.jog.jog_state import JogState
@@ -23,6 +24,8 @@ from rcilab.i18n.units import USUAL, Units
 
 if TYPE_CHECKING:
     from rcilab.app.run.export_actions import Export
+    from rcilab.cell.cell import Cell
+    from rcilab.model.robot_model import RobotModel
 
 Theme = Literal["light", "dark"]
 
@@ -52,6 +55,7 @@ class UiState(AppState):
     jog: JogState = field(default_factory=JogState)
     setup: SetupState = field(default_factory=SetupState)
     """Safety box, tool, load, force-control frame; `model` has this tool and this load."""
+    cell: CellState = field(default_factory=CellState)
     scene: SceneState = field(default_factory=SceneState)
     """Values computed for the scene."""
     program: ProgramState = field(default_factory=ProgramState)
@@ -86,6 +90,11 @@ class UiState(AppState):
     def box(self) -> SafetyBox | None:
         """The safety box that plans are checked with."""
         return self.setup.wanted.box
+
+    def cell_for(self, model: RobotModel) -> Cell | None:
+        """Returns the cell that plans for an arm are checked in, with its tool and load; None without one."""
+        cell = self.cell.cell
+        return None if cell is None or cell.model != model.name else checked_cell(cell, model)
 
 
 class Store(StateStore[UiState]):

@@ -23,7 +23,7 @@ from rcilab.core.arrays import as_vector
 from rcilab.core.errors import UsageError
 from rcilab.core.spatial import Pose
 from rcilab.robots.description import RobotDescription
-from rcilab.robots.mesh import shrink
+from rcilab.robots.mesh import Mesh, shrink
 from rcilab.robots.shapes import ROLE_COLORS, ColorRole, LinkShape, build_shapes
 from rcilab.robots.upright import upright_flange, upright_joints
 from rcilab.views.scene import Color, Scene
@@ -93,6 +93,7 @@ class ArmView:
         self._inset = look.inset
         self._meshes: list[tuple[str, ColorRole]] = []
         self._frames: list[str] = []
+        self._carried = ""  # Name of the mesh of what it carries.
         joints = upright_joints(model.description)
         self._axes = tuple(tuple(joint.axis.tolist()) for joint in joints)
         self._shown = [0.0] * len(joints)
@@ -160,6 +161,17 @@ class ArmView:
             self.tool_node, wxyz=T_flange_tool.wxyz.tolist(), position=T_flange_tool.position.tolist()
         )
 
+    def show_carried(self, mesh: Mesh | None) -> None:
+        """Draws what the arm carries, in the flange frame; None removes it."""
+        self._require_present()
+        node = self.tool_node.rpartition("/")[0] + "/carried"
+        with self._scene.batch():
+            if self._carried:
+                self._scene.remove(node)
+            self._carried = node if mesh is not None else ""
+            if mesh is not None:
+                self._scene.add_mesh(node, mesh.vertices, mesh.faces, color=self._color("dark"), opacity=self._opacity)
+
     def set_visible(self, visible: bool) -> None:
         """Shows or hides the whole arm."""
         self._require_present()
@@ -173,6 +185,8 @@ class ArmView:
         with self._scene.batch():
             for name, role in self._meshes:
                 self._scene.set_style(name, color=self._color(role), opacity=self._opacity)
+            if self._carried:
+                self._scene.set_style(self._carried, color=self._color("dark"), opacity=self._opacity)
 
     def remove(self) -> None:
         """Removes the arm from the scene; calling it again does nothing."""

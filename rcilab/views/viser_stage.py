@@ -65,13 +65,14 @@ def camera_position(aspect: float) -> np.ndarray:
     return look_at + max(1.0, _ROOM / width) * behind
 
 
-def add_environment(server: viser.ViserServer, *, full: bool, dark: bool = False) -> None:
+def add_environment(server: viser.ViserServer, *, full: bool, dark: bool = False, floor: float | None = 0.0) -> None:
     """Adds light, background, ground and base axes.
 
     Args:
         server: The page.
         full: Whether with shadows and reflections, which take seconds with software rendering.
         dark: Whether the page is dark.
+        floor: Height of the ground in the base frame, [m]; None for none.
     """
     scene = server.scene
     scene.configure_default_lights(True, cast_shadow=full)
@@ -91,6 +92,8 @@ def add_environment(server: viser.ViserServer, *, full: bool, dark: bool = False
         fade_distance=5.0,
         fade_strength=1.6,
         shadow_opacity=0.28 if full else 0.0,
+        position=(0.0, 0.0, floor or 0.0),
+        visible=floor is not None,
     )
     scene.add_frame("/base_axes", axes_length=0.22, axes_radius=0.004, origin_radius=0.006)
 

@@ -12,6 +12,7 @@ from typing import IO, TYPE_CHECKING
 from urllib.parse import quote
 
 from rcilab.app.autosave import Autosave, autosave_file
+from rcilab.app.cell.cell_actions import SelectEntry
 from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.connection import PageConnection
 from rcilab.app.control_lock import ClientHeartbeat
@@ -235,6 +236,8 @@ class Workbench:
                 return ChooseBranch(page=page, index=index)
             case live.Condition(id):
                 return PressCheck(page=page, what="row", row=id)
+            case live.Entry(index):
+                return SelectEntry(page=page, index=index)
             case live.Edit(what, key, index):
                 return EditProgram(page=page, what=what, key=key, index=index)
         raise AssertionError(message)

@@ -103,6 +103,12 @@ class Condition(PageMessage):
     id: Annotated[str, msgspec.Meta(pattern=r"\A[a-z_.]{1,60}\Z")]
 
 
+class Entry(PageMessage):
+    """An entry of the cell's list, from 0, was chosen."""
+
+    index: _Key
+
+
 class Edit(PageMessage):
     """An action in the list of waypoints."""
 
@@ -128,6 +134,7 @@ _DECODER = msgspec.json.Decoder(
     | Peek
     | Branch
     | Condition
+    | Entry
     | Edit
 )
 

@@ -20,6 +20,8 @@ from rcilab.workbench.page import dress
 from rcilab.workbench.panels import Panel
 from rcilab.workbench.panels.arm_state import ArmStatePanel
 from rcilab.workbench.panels.branches import BranchesPanel
+from rcilab.workbench.panels.cell import CellFilePanel, CellPanel
+from rcilab.workbench.panels.cell_entry import CellEntryPanel, CellRestPanel
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.elbow import ElbowPanel
 from rcilab.workbench.panels.extras import ExtrasPanel
@@ -69,6 +71,7 @@ _TABS = (
     ("tab.target", "current-location", TargetPanel, ElbowPanel, BranchesPanel, PathTypePanel),
     ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel),
     ("tab.setup", "tool", SetupPanel, SetupNumbersPanel, SoftLimitsPanel),
+    ("tab.cell", "box", CellPanel, CellEntryPanel, CellRestPanel, CellFilePanel),
     ("tab.check", "clipboard-check", CheckPanel),
     (
         "tab.run",

@@ -21,11 +21,13 @@ def beside_program(state: UiState) -> Message | None:
 
 
 def outdated(state: UiState) -> Message | None:
-    """Returns why the plan is out of date, or None: its program, tool, load, joint limits or safety box changed."""
+    """Returns why the plan is out of date, or None: program, tool, load, joint limits, safety box or cell changed."""
     plan, program = state.plan, state.program
     if plan is None or (state.watched and plan.is_recorded):  # What a client commanded stays what it is.
         return None
     stale = plan.stale_parts(state.model, state.setup.wanted.box)
+    if not stale and plan.complete and plan.cell is not state.cell_for(plan.model):
+        stale = ("cell",)
     if plan.program is not None and program.planned is not program.draft:
         if program.planned is None and program.tone == "bad" and program.answer is not None:
             return message("ready.program_fails")

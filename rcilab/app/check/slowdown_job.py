@@ -44,7 +44,7 @@ def slow_to_goal(plan: Plan, speed: float, law: JointLaw, progress: ProgressCall
 
     def make(scale: float) -> Plan | None:
         made = make_plan(plan.model, plan.motion.start, plan.motion.goal, scale * speed, law, plan.box)
-        return replace(made, missed_by=plan.missed_by).completed() if isinstance(made, Plan) else None
+        return replace(made, missed_by=plan.missed_by).completed(cell=plan.cell) if isinstance(made, Plan) else None
 
     return _slower(plan, make, SLOWEST / speed, progress)
 
@@ -59,7 +59,7 @@ def slow_program(plan: Plan, draft: Draft, rounds: int, progress: ProgressCallba
         assert program is not None
         motion = plan_program(plan.model, program, start=plan.motion.start, rounds=rounds, law=PROGRAM_LAW)
         report = check(motion, plan.model, start=plan.motion.start, box=plan.box, distance=None)
-        return replace(build_plan_view(plan.model, motion, report, plan.box), program=program).completed()
+        return replace(build_plan_view(plan.model, motion, report, plan.box), program=program).completed(cell=plan.cell)
 
     slowest = min((step.waypoint.speed for step in draft.steps), default=1.0)
     result = _slower(plan, make, SLOWEST / slowest, progress)
@@ -76,7 +76,9 @@ def scaled(draft: Draft, scale: float) -> Draft:
 
 def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, progress: ProgressCallback) -> SlowdownJob:
     recommended = plan.report.ok
-    found = plan.completed().report.slow_down(recommended=recommended, progress=lambda part: progress(_FOUND * part))
+    found = plan.completed(cell=plan.cell).report.slow_down(
+        recommended=recommended, progress=lambda part: progress(_FOUND * part)
+    )
     progress(_FOUND)
     if found.factor is None or found.factor <= 1.0:
         return SlowdownJob(found=found)
@@ -91,5 +93,5 @@ def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, prog
     assert found.motion is not None
     assert found.report is not None
     whole = build_plan_view(plan.model, found.motion, found.report, plan.box)
-    whole = replace(whole, missed_by=plan.missed_by, program=plan.program, complete=True)
+    whole = replace(whole, missed_by=plan.missed_by, program=plan.program, cell=plan.cell, complete=True)
     return SlowdownJob(found=found, plan=whole, scale=1.0 / found.factor, is_stretched=True)

@@ -160,6 +160,7 @@ class GoalActions:
         self._planned = 0.0  # [s] Time of the last plan.
         self._due: float | None = None  # [s] Time at which a tool path is to be planned.
         self._is_held = False  # The gizmo is being dragged.
+        self._rested = 0.0  # [s] Time before which a change of the cell is not checked.
         self._dragged, self._dragged_at = "", 0.0  # What was dragged last, and when, [s].
 
     @property
@@ -396,8 +397,13 @@ class GoalActions:
             state = self._store.state
         if state.plan is None or time.monotonic() - self._planned < (RESTED if self._is_held else SETTLED):
             return
-        checked = state.plan.completed(state.drive.mode)
+        cell = state.cell_for(state.plan.model)
+        if cell is not state.plan.cell and time.monotonic() < self._rested:
+            return
+        began = time.monotonic()
+        checked = state.plan.completed(state.drive.mode, cell)
         if checked is not state.plan:
+            self._rested = 2.0 * time.monotonic() - began  # An obstacle is dragged: half the time is for requests.
             self._store.update(plan=checked)
 
     def catch_up(self) -> None:

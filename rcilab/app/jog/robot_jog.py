@@ -130,7 +130,7 @@ class RobotJog:
         if not isinstance(made, Plan):
             change_jog(self._store, sentence=made)
             return
-        report = made.completed().report
+        report = made.completed(cell=state.cell_for(state.model)).report
         if report.certificate is None:
             violated = message(f"condition.{report.violations[0].condition.id}")
             change_jog(self._store, sentence=message("jog.unsafe", condition=violated))

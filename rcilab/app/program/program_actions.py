@@ -100,6 +100,7 @@ class ProgramActions:
             here=readonly_copy(start),
             rounds=self._history.state.rounds,
             box=state.setup.wanted.box,
+            cell=state.cell_for(self._history.draft.arm(state.model)),
         )
         self._basis = state.model, job.box
         self._planner.start(job, partial(plan_job, job))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from rcilab.app.planning import Plan, build_plan_view
 from rcilab.app.program.program_draft import Draft
+from rcilab.cell.cell import Cell
 from rcilab.conformance.check import check
 from rcilab.control_process.layout import MOTION_ROWS
 from rcilab.core.arrays import JointVector
@@ -35,6 +36,8 @@ class Job:
     rounds: int
     box: SafetyBox | None
     """The safety box of the check."""
+    cell: Cell | None
+    """The cell of the check."""
 
 
 def plan_job(job: Job, progress: ProgressCallback) -> Plan:
@@ -52,4 +55,4 @@ def plan_job(job: Job, progress: ProgressCallback) -> Plan:
     report = check(motion, job.model, start=job.here, box=job.box, distance=None)
     plan = replace(build_plan_view(job.model, motion, report, job.box), program=job.program)
     progress(_CHECKED)
-    return plan.completed()
+    return plan.completed(cell=job.cell)

@@ -41,7 +41,7 @@ class DriveState:
 def choose_mode(store: StateStore[AppState], mode: Mode) -> None:
     """Chooses the command mode; the plan is checked by the conditions of that mode."""
     state = store.state
-    plan = None if state.plan is None else state.plan.completed(mode)
+    plan = None if state.plan is None else state.plan.completed(mode, state.cell_for(state.plan.model))
     store.update(drive=replace(state.drive, mode=mode), plan=plan)
 
 

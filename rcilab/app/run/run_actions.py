@@ -294,8 +294,8 @@ class RunActions:
     def _execute(self, *, is_agreed: bool, stops: int | None) -> None:
         state = self._store.state
         mode = state.drive.mode
-        if state.plan is not None and (not state.plan.complete or state.plan.mode != mode):
-            state = self._store.update(plan=state.plan.completed(mode))
+        if state.plan is not None:
+            state = self._store.update(plan=state.plan.completed(mode, state.cell_for(state.plan.model)))
         reason = obstacle(state, self._connection.status())
         if reason is not None:
             self._store.notify("warn", reason)

@@ -48,11 +48,13 @@ from rcilab.i18n.number_parsing import parse_number
 from rcilab.i18n.translator import Message, message
 from rcilab.makers.configuration import SETUP_PARTS, RobotConfiguration, SetupPart, SoftJointLimits
 from rcilab.makers.maker import capabilities_of
+from rcilab.model.dynamics.payload import Payload
 from rcilab.robots import describe_robot
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
 
+_SAME_TOOL = 1e-9  # [m], elements of a rotation.
 _HAND_GONE = 1.0  # [s] A drag without an event for this time has ended, whether or not its page is open.
 
 
@@ -289,6 +291,22 @@ class SetupActions:
         elif request.what == "confirm" and setup.asked is setup.wanted:
             self._store.update(setup=replace(setup, asked=None))
             self._send(self._connection.status())
+
+    def mount(self, tool: Pose, load: Payload) -> None:
+        """Sets tool and load, as one step for undo; what the arm cannot be given stays."""
+        model, setup = self._store.state.model, self._store.state.setup
+        wanted = RobotConfiguration(tool=tool, load=load)
+        differing: dict[SetupPart, bool] = {
+            "tool": not model.T_flange_tool.is_close(tool, _SAME_TOOL),
+            "load": model.load != load,
+        }
+        parts: set[SetupPart] = {
+            part for part, differs in differing.items() if differs and explain_missing_part(model, part) is None
+        }
+        if parts:
+            self._past = [*self._past[-UNDO_DEPTH:], (setup.wanted, setup.touched)]
+            wanted = setup.wanted.updated(wanted.only(parts))
+            self._take(replace(setup, wanted=wanted, touched=setup.touched | parts, inertia=None), parts)
 
     def restore(self, setup: RobotConfiguration) -> None:
         """Restores and draws an edited configuration; a real robot gets it only after a question."""

@@ -12,6 +12,7 @@ from rcilab.app.goal.goal import POSE_FIELDS
 from rcilab.app.goal.goal_actions import QUATERNION
 from rcilab.app.run.readiness import is_plan_current
 from rcilab.app.text import Text
+from rcilab.conformance.explain import explain_place
 from rcilab.i18n.rounding import format_fixed
 from rcilab.workbench.panels.jog import problems_html, reach_html
 from rcilab.workbench.widgets import Ask, Html, NumberField, esc, shown_pose
@@ -87,8 +88,12 @@ def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
         sentence = _with_sentence(sentence, text("target.leads_short", short=text.render(plan.missed_by)), text)
         tone, word = (tone, word) if not report.ok else ("warn", "target.not_there")
     if not report.ok:
-        worst, more = report.violations[0].condition.id, report.violated_conditions - 1
-        sentence += " · " + text("scene.violated", condition=text(f"condition.{worst}")) + (f" +{more}" if more else "")
+        worst, more = report.violations[0], report.violated_conditions - 1
+        sentence += " · " + text("scene.violated", condition=text(f"condition.{worst.condition.id}"))
+        if worst.links is not None:
+            place = explain_place(worst, text.language)
+            sentence = text("target.where", violation=sentence, place=place, time=f"{worst.worst_time:.3f}")
+        sentence += f" +{more}" if more else ""
     unheeded = count_unheeded(report) if report.ok else 0
     if unheeded:
         sentence += " · " + text("target.unheeded", count=unheeded)

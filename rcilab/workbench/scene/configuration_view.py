@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.app.cell.cell_state import selected_entry
 from rcilab.app.setup.configuration_state import ON_FLANGE
 from rcilab.app.setup.setup_actions import MoveSetup, ResizeBox
 from rcilab.app.text import Text
@@ -209,8 +210,10 @@ class ConfigurationSceneView:
 
 
 def hides_target(state: UiState) -> bool:
-    """Returns whether the target's gizmo is hidden: the handles of a part on the flange have its place."""
-    return state.setup.edited in ON_FLANGE and state.setup.edited in state.setup.seen
+    """Returns whether the target's gizmo is hidden: other handles have its place, or the operator's attention."""
+    return selected_entry(state.cell) is not None or (
+        state.setup.edited in ON_FLANGE and state.setup.edited in state.setup.seen
+    )
 
 
 def _pose_of(state: UiState, part: str) -> Pose:

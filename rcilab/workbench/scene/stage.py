@@ -12,8 +12,10 @@ from rcilab.app.run.replay import replayed_pose
 from rcilab.app.text import Text
 from rcilab.core.arrays import JointVector
 from rcilab.views.arm_view import ArmView
+from rcilab.views.cell_view import carried_mesh
 from rcilab.views.viser_scene import ViserScene
 from rcilab.views.viser_stage import add_environment, place_camera
+from rcilab.workbench.scene.cell_view import CellSceneView
 from rcilab.workbench.scene.configuration_view import ConfigurationSceneView
 from rcilab.workbench.scene.drag_handle import DragHandle
 from rcilab.workbench.scene.elbow_view import ElbowSceneView
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
+    from rcilab.robots.mesh import Mesh
 
 _Ghost = Literal["commanded", "candidate", "plan"]
 _CANDIDATE_COLORS = {"good": (46, 180, 124), "warn": (240, 165, 40), "bad": (225, 62, 52), "peek": (130, 86, 225)}
@@ -67,7 +70,7 @@ class Stage:
             self._build(state)
             self._built = wanted
         elif state.theme != self._theme:
-            add_environment(self._server, full=state.quality == "full", dark=state.theme == "dark")
+            self._add_environment(state)
         self._theme = state.theme
         if state.model.T_flange_tool is not self._tool:
             self._tool = state.model.T_flange_tool
@@ -89,17 +92,22 @@ class Stage:
         self._extras.show(state)
         self._grip.show(state, status, text)
         self._setup.show(state, text)
-        self._watchers.show(state.control_lock, self._goal.handles + self._elbow.handles + self._setup.handles)
+        self._cell.show(state)
+        self._show_carried(state)
+        self._watchers.show(
+            state.control_lock, self._goal.handles + self._elbow.handles + self._setup.handles + self._cell.handles
+        )
 
     def _build(self, state: UiState) -> None:
         server, full = self._server, state.quality == "full"
         if self._built is not None:
             self._setup.remove()
+            self._cell.remove()
             for part in (self._goal, self._elbow, self._ribbon, self._extras, self._grip, self._live):
                 part.remove()
             for ghost in self._ghosts.values():
                 ghost.remove()
-        add_environment(server, full=full, dark=state.theme == "dark")
+        self._add_environment(state)
         drawing = self._drawing = ViserScene(server, shadows=full)
         self._model = model = state.model
         self._live = ArmView(drawing, "live", model, "live", quality="fine" if full else "coarse")
@@ -107,11 +115,31 @@ class Stage:
         self._visible.clear()
         self._grip = DragHandle(server, drawing, self._live, self._ask)
         self._setup = ConfigurationSceneView(server, drawing, self._live, self._ask)
+        self._cell = CellSceneView(server, drawing, self._ask)
+        self._carried: Mesh | None = None
+        self._carried_of: tuple[object, object] = (None, None)
         self._goal = GoalView(server, state, self._ask)
         self._elbow = ElbowSceneView(server, drawing, self._ask)
         self._ribbon = PathStripView(server, drawing, self._ask)
         self._extras = ExtrasView(server, drawing, self._live)
         self._tool = model.T_flange_tool
+
+    def _show_carried(self, state: UiState) -> None:
+        """Draws tool and part of the cell on every arm, and the ground at its floor."""
+        wanted = (state.cell.cell, state.model.T_flange_tool)
+        if wanted[0] is self._carried_of[0] and wanted[1] is self._carried_of[1]:
+            return
+        self._carried_of = wanted
+        self._carried = carried_mesh(state.cell_for(state.model), state.model.T_flange_tool)
+        for arm in (self._live, *self._ghosts.values()):
+            arm.show_carried(self._carried)
+        if _floor_of(state) != self._floor:
+            self._add_environment(state)
+
+    def _add_environment(self, state: UiState) -> None:
+        self._floor = _floor_of(state)
+        full, dark = state.quality == "full", state.theme == "dark"
+        add_environment(self._server, full=full, dark=dark, floor=self._floor)
 
     def _show_presence(self, is_there: bool) -> None:
         """Draws the arm translucent while no robot reports its position."""
@@ -152,6 +180,7 @@ class Stage:
         """Shows or hides a ghost; creates it at its first use, so that opening a page does not wait for it."""
         if visible and name not in self._ghosts:
             self._ghosts[name] = ArmView(self._drawing, name, self._model, name)
+            self._ghosts[name].show_carried(self._carried)
             self._visible.add(name)
         if name not in self._ghosts:
             return
@@ -161,6 +190,11 @@ class Stage:
         if visible != (name in self._visible):
             (self._visible.add if visible else self._visible.discard)(name)
             ghost.set_visible(visible)
+
+
+def _floor_of(state: UiState) -> float | None:
+    cell = state.cell.cell
+    return 0.0 if cell is None else cell.floor_height
 
 
 def _apart(a: np.ndarray, b: np.ndarray) -> float:
