@@ -159,6 +159,7 @@ class MotionRunner:
                 realtime=self._realtime,
                 model=model,
                 setup=setup,
+                cell=self._arm.cell,
             )
             for listener in self._listeners:
                 listener(run, error)

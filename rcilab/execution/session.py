@@ -111,7 +111,6 @@ class RobotSession(Closeable):
         self._runner = runner
         self._simulation = simulation
         self._commands = driver.open_commands(arm, lock)
-        self._cell: Cell | None = None
         self._streamed: tuple[MotionStream, SpeedOverride[bool]] | None = None
         """Stream and speed override of the running `execute`."""
         with _sessions_lock:
@@ -151,7 +150,7 @@ class RobotSession(Closeable):
     @property
     def cell(self) -> Cell | None:
         """The cell of the arm, if set in this session; motions are checked with it."""
-        return self._cell
+        return self._arm.cell
 
     @property
     def address(self) -> str:
@@ -310,7 +309,7 @@ class RobotSession(Closeable):
                 carried = cell.applied_to(self.model)
                 self.configure(RobotConfiguration(tool=carried.T_flange_tool, load=carried.load))
         with self._lock.acquire("set_cell"):
-            self._cell = cell
+            self._arm.cell = cell
 
     def set_output(self, signal: int, level: bool) -> None:
         """Sets a digital output by its number, from 0."""

@@ -23,6 +23,7 @@ from rcilab.makers.maker import Maker, all_makers
 from rcilab.robots import DhRow
 
 if TYPE_CHECKING:
+    from rcilab.cell.cell import Cell
     from rcilab.model.robot_model import RobotModel
 
 GuideSpace: TypeAlias = Literal["joint", "cartesian"]
@@ -79,6 +80,8 @@ class ConfiguredArm:
     safety_box: SafetyBox | None = None
     collision_thresholds: JointVector | None = None
     """Shape (n,), [N m]."""
+    cell: Cell | None = None
+    """The cell that motions are checked with; not sent."""
 
 
 @dataclass(frozen=True, slots=True)

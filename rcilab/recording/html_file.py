@@ -12,7 +12,7 @@ import gzip
 import html
 import json
 import re
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from hashlib import sha256
 from importlib.resources import files
 from typing import IO, TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rcilab.cell.shape_mesh import carried_solids, solid_mesh
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.i18n.catalogue import load_catalogue
 from rcilab.i18n.plot_scale import ERRORS, PlotScale, plot_scale
@@ -30,12 +31,14 @@ from rcilab.robots.shapes import ROLE_COLORS, build_shapes
 from rcilab.robots.upright import upright_flange, upright_joints
 
 if TYPE_CHECKING:
+    from rcilab.cell.cell import Cell
     from rcilab.i18n.translator import Text
     from rcilab.model.robot_model import RobotModel
     from rcilab.recording.run import Run
     from rcilab.recording.tracking import Tracking
 
 _PATH_POINTS = 1200  # Of the drawn tool path; tuning value: smooth at the size of a screen.
+_COLORS = {"obstacle": (0.62, 0.66, 0.72), "tool": (0.30, 0.33, 0.38), "part": (0.90, 0.62, 0.25)}
 _PLOTS = ("q", "dq", "tau", *ERRORS)
 
 
@@ -47,7 +50,7 @@ def write_html(run: Run, stream: IO[bytes], text: Text) -> None:
         "words": _texts(run, text),
         "run": _pack_run(run, tracking, scales, packed),
         "charts": [_chart(name, scale, text, run) for name, scale in scales.items()],
-        "arm": None if run.model is None else _pack_arm(run.model, packed),
+        "arm": None if run.model is None else _pack_arm(run.model, run.cell, packed),
         "path": None if run.model is None else _pack_path(run, run.model, tracking, scales["tool"], packed),
         "facts": {
             "errors": error_rows(run, tracking, text),
@@ -151,18 +154,36 @@ def _pack_run(run: Run, tracking: Tracking, scales: dict[str, PlotScale], packed
     return {"n": run.q.shape[1], "arrays": packs, "limits": limits}
 
 
-def _pack_arm(model: RobotModel, packed: _Packed) -> dict[str, Any]:
+def _pack_arm(model: RobotModel, cell: Cell | None, packed: _Packed) -> dict[str, Any]:
     shape = build_shapes(model.description, "coarse")
     meshes = []
     for link, body in enumerate((shape.base, *shape.links)):
         for part in body.parts:
             arrays = {"vertices": packed.add(part.mesh.vertices), "faces": packed.add(part.mesh.faces, "<u4")}
             meshes.append({"link": link, "color": [c / 255.0 for c in ROLE_COLORS[part.role]], **arrays})
+    if cell is not None:
+        meshes += _pack_cell(model, cell, packed)
     return {
         "meshes": meshes,
+        "floor": (None if cell is None else cell.floor_height) or 0.0,
         "joints": [{"origin": j.origin.tolist(), "axis": j.axis.tolist()} for j in upright_joints(model.description)],
         "tool": (upright_flange(model.description) @ model.T_flange_tool).as_row_major(),
     }
+
+
+def _pack_cell(model: RobotModel, cell: Cell, packed: _Packed) -> list[dict[str, Any]]:
+    """Returns the obstacles, and on the last link the tool and the held part; each triangle with corners of its own."""
+    T_link_flange = upright_flange(model.description)
+    found = [(0, "obstacle", cell.solid(obstacle.name)) for obstacle in cell.obstacles]
+    for name, solids in carried_solids(cell, model.T_flange_tool).items():
+        found += [(model.n, name, replace(solid, pose=T_link_flange @ solid.pose)) for solid in solids]
+    meshes: list[dict[str, Any]] = []
+    for link, name, solid in found:
+        mesh = solid_mesh(solid)
+        corners = mesh.vertices[mesh.faces].reshape(-1, 3)
+        arrays = {"vertices": packed.add(corners), "faces": packed.add(np.arange(len(corners)), "<u4")}
+        meshes.append({"link": link, "color": _COLORS[name], "casts": name != "obstacle", **arrays})
+    return meshes
 
 
 def _pack_path(

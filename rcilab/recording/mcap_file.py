@@ -1,8 +1,9 @@
 """A run as MCAP: messages with JSON schemas, for Foxglove and PlotJuggler.
 
 Topics, one message per cycle: /measured, /commanded, /plan, /error, /health, /state if the complete state was recorded,
-and /tool as a foxglove.PoseInFrame, which Foxglove draws in 3D. Times are those of the controller's cycles, counted
-from the start of the run. The facts of the run are in the metadata record "rcilab".
+and /tool as a foxglove.PoseInFrame, which Foxglove draws in 3D. A run in a cell has its solids in /cell, as a
+foxglove.SceneUpdate in the frames base and flange, and the pose of the flange in /flange. Times are those of the
+controller's cycles, counted from the start of the run. The facts of the run are in the metadata record "rcilab".
 """
 
 from __future__ import annotations
@@ -16,8 +17,16 @@ import numpy as np
 
 from rcilab.core.cycle_log import OTHER_STATE_FIELDS
 from rcilab.core.optional_deps import require_library
-from rcilab.core.spatial import Pose
+from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.recording.columns import run_facts
+from rcilab.recording.foxglove import (
+    POSE_SCHEMA,
+    SCENE_SCHEMA,
+    TRANSFORM_SCHEMA,
+    pose_in_frame,
+    scene_message,
+    transform_message,
+)
 
 if TYPE_CHECKING:
     from rcilab.core.arrays import Array
@@ -56,13 +65,22 @@ def write_mcap(run: Run, stream: IO[bytes], progress: Callable[[float], None]) -
     tool = run.T_base_tool if np.isfinite(run.T_base_tool).all() else None
     if tool is None and run.model is not None:
         tool = run.model.forward_path(run.q)
-    tool_channel = None if tool is None else _register(writer, "tool", "foxglove.PoseInFrame", _POSE_SCHEMA)
+    tool_channel = None if tool is None else _register(writer, "tool", "foxglove.PoseInFrame", POSE_SCHEMA)
+    flange_channel, T_tool_flange = None, IDENTITY
+    if run.cell is not None and run.model is not None and len(stamps):
+        scene = scene_message(run.cell, run.model.T_flange_tool, int(stamps[0]))
+        _write(writer, _register(writer, "cell", "foxglove.SceneUpdate", SCENE_SCHEMA), int(stamps[0]), scene)
+        flange_channel = _register(writer, "flange", "foxglove.FrameTransform", TRANSFORM_SCHEMA)
+        T_tool_flange = run.model.T_flange_tool.inverse()
     for row, stamp in enumerate(stamps.tolist()):
         for topic, table in tables.items():
             message = {name: _without_nan(values[row]) for name, values in table}
             _write(writer, channels[topic], stamp, message)
         if tool is not None and tool_channel is not None:
-            _write(writer, tool_channel, stamp, _pose_message(tool[row], stamp))
+            _write(writer, tool_channel, stamp, pose_in_frame(Pose.from_matrix(tool[row]), stamp))
+            if flange_channel is not None:
+                flange = Pose.from_matrix(tool[row]) @ T_tool_flange
+                _write(writer, flange_channel, stamp, transform_message(flange, stamp))
         if row % _PROGRESS_INTERVAL == 0:
             progress(row / len(stamps))
     writer.finish()
@@ -131,36 +149,3 @@ def _without_nan(value: Any) -> Any:
     if isinstance(value, list):
         return [_without_nan(entry) for entry in value]
     return None if value != value else value
-
-
-def _pose_message(T: Array, stamp: int) -> dict[str, Any]:
-    pose = Pose.from_matrix(T)
-    x, y, z = pose.position.tolist()
-    w, i, j, k = pose.wxyz.tolist()
-    return {
-        "timestamp": {"sec": stamp // 1_000_000_000, "nsec": stamp % 1_000_000_000},
-        "frame_id": "base",
-        "pose": {"position": {"x": x, "y": y, "z": z}, "orientation": {"x": i, "y": j, "z": k, "w": w}},
-    }
-
-
-def _numbers(*names: str) -> dict[str, Any]:
-    return {"type": "object", "properties": {name: {"type": "number"} for name in names}}
-
-
-_POSE_SCHEMA: dict[str, Any] = {
-    "type": "object",
-    "title": "foxglove.PoseInFrame",
-    "properties": {
-        "timestamp": {
-            "type": "object",
-            "title": "time",
-            "properties": {"sec": {"type": "integer", "minimum": 0}, "nsec": {"type": "integer", "minimum": 0}},
-        },
-        "frame_id": {"type": "string"},
-        "pose": {
-            "type": "object",
-            "properties": {"position": _numbers("x", "y", "z"), "orientation": _numbers("x", "y", "z", "w")},
-        },
-    },
-}

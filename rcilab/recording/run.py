@@ -33,6 +33,7 @@ from rcilab.recording.tracking import Tracking, compute_tracking, count_compared
 from rcilab.robots import ROBOTS_BY_MAKER, describe_robot
 
 if TYPE_CHECKING:
+    from rcilab.cell.cell import Cell
     from rcilab.conformance.report import Report
     from rcilab.model.robot_model import RobotModel
 
@@ -106,6 +107,8 @@ class Run:
     """The arm, with its tool and load; None if it is not known."""
     setup: Setup = field(default_factory=Setup)
     """Circumstances of the run."""
+    cell: Cell | None = None
+    """The cell that the motion was checked with; None without one."""
     maker: str = ""
     """Maker whose faults the bits of `cycles["faults"]` are; empty: that of the arm."""
     has_speed_override: bool = False
@@ -288,7 +291,7 @@ class Run:
         if self.plan is None or self.model is None:
             return None
         known: list[Mode] = [mode for mode in MODES if mode == self.setup.mode]
-        return check(self.plan, self.model, mode=known[0] if known else "joint_position")
+        return check(self.plan, self.model, cell=self.cell, mode=known[0] if known else "joint_position")
 
     def commanded(self) -> Motion:
         """Returns the motion that the controller reports as commanded, on the 1 ms grid, without the play-out delay.
@@ -477,6 +480,7 @@ def build_run(
     setup: Setup | None = None,
     has_speed_override: bool = False,
     maker: str = "",
+    cell: Cell | None = None,
 ) -> Run:
     """Returns a run from recorded cycles: the rows from the first command on."""
     rows = cycles[np.isfinite(cycles["t"])]
@@ -491,6 +495,7 @@ def build_run(
         setup=setup or Setup(),
         has_speed_override=has_speed_override,
         maker=maker,
+        cell=cell,
     )
 
 

@@ -10,6 +10,7 @@ The file is a sequence of chunks (`chunks.py`), in this order:
             "report": the check of the plan, one object per condition, or null}
     PLAN    the planned motion as `Motion.save` writes it; missing for a callback. After a change of the speed override
             a second PLAN follows the cycles, with the motion as executed; the last one is valid
+    CELL    the cell that the motion was checked with, as a ZIP archive (`Cell.save`); missing without one
     CYCL    u32 number of cycles, then zlib of their bytes, transposed: the first byte of every cycle, then the second
             byte of every cycle, and so on (adjacent bytes are then similar and compress to a quarter). Any number of
             these chunks
@@ -38,6 +39,8 @@ from typing import IO, TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rcilab.cell.cell import Cell
+from rcilab.cell.cell_storage import pack_cell, unpack_cell
 from rcilab.core.arrays import described
 from rcilab.core.atomic_file import read_limited
 from rcilab.core.clock import CYCLE_TIME
@@ -95,6 +98,7 @@ class RunWriter:
         report: The check of the plan.
         realtime: False in lock-step.
         maker: Maker whose faults the bits are; empty: that of the arm.
+        cell: The cell that the motion was checked with.
     """
 
     def __init__(
@@ -108,6 +112,7 @@ class RunWriter:
         report: Report | None = None,
         realtime: bool = True,
         maker: str = "",
+        cell: Cell | None = None,
     ) -> None:
         self._stream = stream
         self._dtype = dtype
@@ -125,6 +130,8 @@ class RunWriter:
         stream.write(encode_header() + encode_chunk("HEAD", json.dumps(head).encode()))
         if plan is not None:
             self._write_plan(plan)
+        if cell is not None:
+            stream.write(encode_chunk("CELL", pack_cell(cell)))
         stream.flush()
 
     def add(self, cycles: NDArray[np.void]) -> None:
@@ -183,7 +190,7 @@ class RunFile:
         path: Destination; an existing file is replaced.
         dtype: Layout of one cycle.
         is_new: Whether an existing file is an error.
-        facts: `plan`, `model`, `setup`, `report`, `realtime` as for `RunWriter`.
+        facts: `plan`, `model`, `setup`, `report`, `realtime`, `cell` as for `RunWriter`.
 
     Raises:
         FileExistsError: It exists, and `is_new`.
@@ -254,6 +261,7 @@ def write_run(run: Run, stream: IO[bytes]) -> None:
         report=run.report,
         realtime=run.realtime,
         maker=run.maker,
+        cell=run.cell,
     )
     writer.add(run.cycles)
     writer.finish(stopped=run.stopped, truncated=run.truncated, has_speed_override=run.has_speed_override)
@@ -353,6 +361,7 @@ def _build(chunks: tuple[Chunk, ...], max_rows: int, build: Callable[..., R]) ->
         model=None if head["arm"] is None else _build_arm(head["arm"]),
         setup=Setup.from_dict(head["setup"]),
         maker=str(head.get("maker", "")),
+        cell=next((unpack_cell(chunk.payload, "CELL", Cell) for chunk in chunks if chunk.kind == "CELL"), None),
         has_speed_override=bool(tail.get("paced", len(plans) > 1)),
         is_complete=bool(tails),
     )

@@ -7,6 +7,7 @@ this size and prevent ringing of a simulated arm; they are not measured on an xM
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -46,6 +47,17 @@ class FlangeLoad(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surroundings:
+    """Elements of what stands around an arm and what it carries, one a line."""
+
+    assets: tuple[str, ...] = ()
+    world: tuple[str, ...] = ()
+    """In the frame of the base."""
+    carried: tuple[str, ...] = ()
+    """In the frame of the flange."""
+
+
 def build_mjcf(
     description: RobotDescription,
     *,
@@ -54,6 +66,7 @@ def build_mjcf(
     T_flange_tool: Pose = IDENTITY,
     load: FlangeLoad | None = None,
     mounted: MountedTool | None = None,
+    surroundings: Surroundings | None = None,
 ) -> str:
     """Returns the MJCF of an arm; without meshes it needs no other file.
 
@@ -67,6 +80,7 @@ def build_mjcf(
         T_flange_tool: Pose of the tool in the flange.
         load: A body fixed to the flange; None, or one without mass, adds no body.
         mounted: A tool of the maker, whose capsules are added to the last link; its mass is that of `load`.
+        surroundings: Further elements.
     """
     directory = f"meshes/{description.name}" if mesh_dir is None else mesh_dir.rstrip("/")
     shape = build_shapes(description, "coarse")
@@ -87,9 +101,15 @@ def build_mjcf(
         f'    <default class="collision"><geom type="capsule" mass="0" group="{_COLLISION_GROUP}"/></default>',
         "  </default>",
     ]
-    if meshes:
-        lines += _assets(shape.base, shape.links)
-    lines += ["  <worldbody>", '    <body name="base">', *_body("base", description.base, shape.base, meshes, 3)]
+    added = surroundings or Surroundings()
+    if meshes or added.assets:
+        lines += ["  <asset>", *(_assets(shape.base, shape.links) if meshes else []), *added.assets, "  </asset>"]
+    lines += [
+        "  <worldbody>",
+        *(f"    {line}" for line in added.world),
+        '    <body name="base">',
+        *_body("base", description.base, shape.base, meshes, 3),
+    ]
     for number, (link, solid) in enumerate(zip(description.links, shape.links, strict=True), start=1):
         lines += _joint_body(description, number) + _body(f"link{number}", link, solid, meshes, number + 3)
     pad = "  " * (description.n + 3)
@@ -106,6 +126,9 @@ def build_mjcf(
             f"{pad}  {_inertial(load.mass, load.center_of_mass, _thickened(load.inertia))}",
         ]
         lines.append(f"{pad}</body>")
+    if added.carried:
+        lines += [f'{pad}<body name="carried"{orientation}>', *(f"{pad}  {line}" for line in added.carried)]
+        lines.append(f"{pad}</body>")
     lines += ["  " * depth + "</body>" for depth in range(description.n + 2, 1, -1)]
     return "\n".join([*lines, "  </worldbody>", *_contacts(description), *_motors(description), "</mujoco>", ""])
 
@@ -116,7 +139,7 @@ def _orientation(T: Pose) -> str:
 
 
 def _assets(base: LinkShape, links: Iterable[LinkShape]) -> list[str]:
-    lines = ["  <asset>"]
+    lines: list[str] = []
     for role, color in ROLE_COLORS.items():
         rgb = " ".join(f"{value / 255.0:.4f}" for value in color)
         lines.append(f'    <material name="{role}" rgba="{rgb} 1" specular="0.4" shininess="0.4"/>')
@@ -124,7 +147,7 @@ def _assets(base: LinkShape, links: Iterable[LinkShape]) -> list[str]:
         name = "base" if number == 0 else f"link{number}"
         for part in shape.parts:
             lines.append(f'    <mesh name="{name}_{part.role}" file="{mesh_file(name, part.role)}"/>')
-    return [*lines, "  </asset>"]
+    return lines
 
 
 def _joint_body(description: RobotDescription, number: int) -> list[str]:

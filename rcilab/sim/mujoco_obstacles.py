@@ -18,7 +18,9 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel
-from rcilab.sim.mujoco_cell import ALL, LINK, add_carried, add_obstacles
+from rcilab.robots.mjcf import Surroundings
+from rcilab.robots.shapes import tool_capsules
+from rcilab.sim.mujoco_cell import ALL, LINK, TOOL, CellElements, cell_elements
 
 MOST_BOXES = 16
 _FLOOR = "floor"
@@ -41,8 +43,7 @@ class Obstacles:
 
     def __init__(self, cell: Cell | None = None) -> None:
         self._cell = cell
-        self._placed: dict[str, list[str]] = {}
-        """Names of the geoms of each obstacle of the cell."""
+        self._elements = CellElements(Surroundings(), {}, {})
         self._boxes: dict[str, tuple[float, float, float, Pose]] = {}
         height = None if cell is None else cell.floor_height
         self._has_floor, self._floor = height is not None, height or 0.0
@@ -52,15 +53,23 @@ class Obstacles:
     @property
     def is_empty(self) -> bool:
         """Whether there are no obstacles."""
-        return not (self._placed or self._boxes or self._has_floor or self._walls)
+        return not ((self._cell and self._cell.obstacles) or self._boxes or self._has_floor or self._walls)
+
+    def surroundings(self, model: RobotModel) -> Surroundings | None:
+        """Returns the elements of the cell for the MJCF of an arm; None without a cell."""
+        if self._cell is None:
+            return None
+        self._elements = cell_elements(self._cell, model.T_flange_tool)
+        return self._elements.surroundings
 
     def add_to(self, spec: Any, mj: Any, model: RobotModel) -> None:
         """Adds the geoms to the `MjSpec` of an arm and disables contact between the arm's own geoms."""
-        for geom in spec.geoms:
+        own = [geom for body in spec.bodies if body.name.startswith(("base", "link")) for geom in body.geoms]
+        for geom in own:
             geom.contype, geom.conaffinity = 0, LINK
         if self._cell is not None:
-            add_carried(spec, mj, self._cell, model)
-            self._placed = add_obstacles(spec, mj, self._cell)
+            for geom in own[len(own) - len(tool_capsules(model.description, model.mounted)) :]:
+                geom.conaffinity = TOOL  # The last geoms of the last link.
         for names, kind in (((_FLOOR, *_WALLS), mj.mjtGeom.mjGEOM_PLANE), (_BOXES, mj.mjtGeom.mjGEOM_BOX)):
             for name in names:
                 size = [1.0, 1.0, 1.0]
@@ -103,7 +112,8 @@ class Obstacles:
     def find_overlap(self, data: Any) -> str | None:
         """Returns which link of the arm, or what it carries, overlaps what is solid, as text; None if none does."""
         solids = [(f"the box {name!r}", slot) for slot, name in zip(_BOXES, self._boxes, strict=False)]
-        solids += [(f"the obstacle {name!r}", geom) for name, geoms in self._placed.items() for geom in geoms]
+        placed = self._elements.obstacles.items()
+        solids += [(f"the obstacle {name!r}", geom) for name, geoms in placed for geom in geoms]
         if self._cell is not None and self._has_floor:
             solids.append(("the floor of the cell", _FLOOR))
         for solid, geom in solids:
@@ -141,7 +151,9 @@ class Obstacles:
         links = np.flatnonzero((model.geom_conaffinity & model.geom_contype[solid] != 0) & moves)
         distances = [mj.mj_geomDistance(model, data, int(link), solid, _NEAR, None) for link in links]
         nearest = int(np.argmin(distances))
-        return -distances[nearest], str(model.body(int(model.geom_bodyid[links[nearest]])).name)
+        geom = model.geom(int(links[nearest]))
+        body = str(model.body(int(geom.bodyid[0])).name)
+        return -distances[nearest], self._elements.bodies.get(str(geom.name), body)
 
     def _clearing_distance(self, box: int, data: Any, direction: Array) -> float:
         """Returns how far a box has to move along a direction to be free of the arm, [m]."""

@@ -255,7 +255,13 @@ class MuJoCoPlant:
         mj: Any = mujoco
         mj.set_mju_user_warning(_log_warning)  # Otherwise MuJoCo writes a file into the user's directory.
         load = model.load if self._mounted is None else self._mounted
-        text = build_mjcf(model.description, T_flange_tool=model.T_flange_tool, load=load, mounted=model.mounted)
+        text = build_mjcf(
+            model.description,
+            T_flange_tool=model.T_flange_tool,
+            load=load,
+            mounted=model.mounted,
+            surroundings=self._obstacles.surroundings(model),
+        )
         spec: Any = mj.MjSpec.from_string(text)
         self._obstacles.add_to(spec, mj, model)
         self._mj, self._robot, self._n = mj, model, model.n

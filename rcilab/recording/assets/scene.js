@@ -43,8 +43,8 @@ const SHADERS = {
       o = vec4((color.rgb * light + shine + rim) * color.a, color.a);
     }`],
   flat: [`#version 300 es
-    uniform mat4 view, model; in vec3 place; out vec3 p;
-    void main() { vec4 w = model * vec4(place, 1.0); w.xyz -= w.z * vec3(0.5, -0.61, 1.0); w.z = 0.001; p = w.xyz; gl_Position = view * w; }`,
+    uniform mat4 view, model; uniform float ground; in vec3 place; out vec3 p;
+    void main() { vec4 w = model * vec4(place, 1.0); w.xyz -= (w.z - ground) * vec3(0.5, -0.61, 1.0); w.z = ground + 0.001; p = w.xyz; gl_Position = view * w; }`,
   `#version 300 es
     precision highp float; uniform vec4 color; in vec3 p; out vec4 o;
     void main() { o = vec4(0.07, 0.12, 0.2, 1.0) * 0.20 * (1.0 - smoothstep(0.6, 1.9, length(p.xy))); }`],
@@ -79,7 +79,8 @@ class Scene {
     if (!gl) throw new Error("no WebGL 2");
     this.programs = Object.fromEntries(Object.entries(SHADERS).map(([name, source]) => [name, this.link(...source)]));
     this.meshes = arm.meshes.map((mesh) => ({ ...mesh, ...this.upload(array(mesh.vertices), array(mesh.faces)) }));
-    this.ground = this.buffer(new Float32Array([-3, -3, 0, 3, -3, 0, -3, 3, 0, 3, 3, 0]));
+    const z = arm.floor;
+    this.ground = this.buffer(new Float32Array([-3, -3, z, 3, -3, z, -3, 3, z, 3, 3, z]));
     this.paths = path ? this.makePaths(path, array) : [];
     this.camera = { yaw: -0.83, pitch: 0.36, distance: 3.15, at: [0.06, 0.0, 0.5] };
     this.steer();
@@ -202,8 +203,9 @@ class Scene {
   drawArm(shader, view, poses, eye, tint) {
     const gl = this.gl, { program, uniform } = this.use(shader, view);
     gl.uniform3f(uniform("eye"), ...eye);
+    gl.uniform1f(uniform("ground"), this.arm.floor);
     for (const mesh of this.meshes) {
-      if (tint && mesh.link === 0) continue;
+      if ((tint && mesh.link === 0) || (shader === "flat" && mesh.casts === false)) continue;
       gl.uniformMatrix4fv(uniform("model"), false, poses[mesh.link]);
       gl.uniform4f(uniform("color"), ...(tint || [...mesh.color, 1]));
       this.attribute(program, "place", mesh.place, 3);
