@@ -69,6 +69,8 @@ class AppState:
     law: JointLaw = "torque_rate_limited"
     path_type: PathType = "joint"
     """How the tool moves to the goal."""
+    search: float | None = None
+    """Progress of the search for a path around obstacles, 0 to 1; None without one."""
     via: Pose | None = None
     """Via point of an arc."""
     playhead: float = 0.0

@@ -179,6 +179,7 @@ class Dispatcher:
         self._ending.set()
         if self._thread is not None:
             self._thread.join(10.0)
+        self._goal.close()
         self._jog.release()
         self._push.close()
         self._world.close()

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.cell.cell import Cell
+from rcilab.cell.plan_free import plan_free
 from rcilab.conformance.check import check
 from rcilab.conformance.free_elbow import resulting_motion
 from rcilab.core.arrays import Array, JointVector
+from rcilab.core.background_job import ProgressCallback
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import RcilabError
 from rcilab.core.safety_box import SafetyBox, active_box
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
     from rcilab.conformance.report import Report
     from rcilab.motion import Motion, Program
 
-PathType = Literal["joint", "line", "arc"]
+PathType = Literal["joint", "line", "arc", "free"]
 PATH_TYPES: tuple[PathType, ...] = get_args(PathType)
 
 SMALLEST_MOTION = 1e-4  # [rad] A goal closer than this to the arm counts as the arm's position.
@@ -138,8 +140,13 @@ def make_plan(
     box: SafetyBox | None = None,
     kind: PathType = "joint",
     via: Pose | None = None,
+    cell: Cell | None = None,
+    progress: ProgressCallback | None = None,
 ) -> Plan | Message:
-    """Returns a motion from start to goal, checked except for collisions, or why planning failed."""
+    """Returns a motion from start to goal, checked except for collisions, or why planning failed.
+
+    A motion of the kind "free" leads around the obstacles of a cell; `progress` receives the used share of its time.
+    """
     outside = explain_outside(model, "start", start) or explain_outside(model, "goal", goal)
     if outside is not None:
         return outside
@@ -148,7 +155,11 @@ def make_plan(
     if kind == "arc" and via is None:
         return message("plan.no_via")
     try:
-        motion = _go(model, start, goal, speed, law, kind, via)
+        if kind == "free":
+            around = Cell(model=model.name) if cell is None else cell
+            motion = plan_free(model, start, goal, around, speed=speed, law=law, progress=progress)
+        else:
+            motion = _go(model, start, goal, speed, law, kind, via)
         report = check(motion, model, start=start, box=box, distance=None)
     except RcilabError as error:
         return message("plan.failed", error=describe_error(error))

@@ -91,7 +91,7 @@ def plan_free(
         raise PlanningError(
             f"no path around the obstacles was found in {seconds:g} s: give the search more time (budget=...), another "
             "seed, or make room in the cell"
-        )
+        ).coded("no_free_path", seconds=f"{seconds:g}")
     if len(corners) == 2:
         return straight
     waypoints = [Waypoint.joint(q, speed=speed) for q in corners[1:]]
@@ -101,7 +101,9 @@ def plan_free(
         motion = plan_program(model, program, law=law, progress=lambda _: report(1.0))
         if _is_clear(motion.q, query, required, levers):
             return motion
-    raise PlanningError("the motion along the path comes too near: use another seed, or require less distance")
+    raise PlanningError("the motion along the path comes too near: use another seed, or require less distance").coded(
+        "free_too_near"
+    )
 
 
 def _excess(query: DistanceQuery, required: ClearanceLimit, q: JointVector) -> tuple[float, LinkPair]:
@@ -121,7 +123,7 @@ def _require_free(query: DistanceQuery, required: ClearanceLimit, q: JointVector
         raise PlanningError(
             f"the {name} is not free: {pair} are {-1e3 * excess:.3g} mm nearer than required; choose another {name}, "
             "or move the obstacle"
-        )
+        ).coded("not_free", end=name, pair=pair, distance=-excess)
 
 
 def _is_clear(path: JointPath, query: DistanceQuery, required: ClearanceLimit, levers: Array) -> bool:

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from functools import reduce
 from typing import Any
 
+from rcilab.core.clearance import LinkPair, link_name
 from rcilab.core.errors import InvalidValueError, RcilabError
 from rcilab.i18n.translator import ComparedValue, LiteralText, Message, Remark, message
 
-_NAMES = frozenset({"status", "kind", "condition", "feature"})
+_NAMES = frozenset({"end", "status", "kind", "condition", "feature"})
 """Facts whose values have their own catalogue entries: the reply to a command, the type of a waypoint, a condition, a
 feature that an arm does not have."""
 _REQUIREMENTS = frozenset(
@@ -86,4 +87,15 @@ def _with_digits(facts: Mapping[str, Any]) -> dict[str, Any]:
 def _with_names(facts: Mapping[str, object]) -> dict[str, object]:
     """Returns the facts, with those in `_NAMES` replaced by messages."""
     names = {name: message(f"{name}.{str(facts[name]).replace(' ', '_')}") for name in _NAMES & facts.keys()}
-    return {**facts, **names}
+    pairs = {name: _describe_pair(fact) for name, fact in facts.items() if isinstance(fact, LinkPair)}
+    return {**facts, **names, **pairs}
+
+
+def _describe_pair(pair: LinkPair) -> Message:
+    first, second, obstacle = pair
+    return message("pair", first=_describe_link(first), second=obstacle or _describe_link(second))
+
+
+def _describe_link(number: int) -> Message:
+    name = link_name(number)
+    return message("pair.link", number=number) if number > 0 else message(f"pair.{name}")

@@ -23,7 +23,7 @@ from rcilab.notebook.slider_echo import SliderEcho
 from rcilab.notebook.style import block, problem, soft, verdict, write
 from rcilab.notebook.widget_sharing import shared_style_widget
 
-_PATH_TYPES: tuple[PathType, ...] = ("joint", "line")  # Without "arc": the notebook has no via point.
+_PATH_TYPES: tuple[PathType, ...] = ("joint", "line")  # The notebook has no via point, and no cell.
 _PROGRESS_DELAY = 0.3  # [s] Plans that take less, as most do, show no progress bar.
 
 

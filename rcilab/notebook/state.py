@@ -203,7 +203,7 @@ class LabState:
             make, mode = self.goals.prepare_plan(self.here), self.now.drive.mode
 
         def run(progress: ProgressCallback) -> Plan | Message:
-            made = make()
+            made = make(progress)
             progress(_PLANNED)
             return made.completed(mode) if isinstance(made, Plan) else made
 

@@ -14,11 +14,13 @@ import trimesh
 from rcilab.app.cell.cell_actions import AddMesh, EditCell, LoadCell, MoveEntry, SelectEntry, SetCell
 from rcilab.app.cell.cell_edit import base_pose_of
 from rcilab.app.cell.cell_state import Entry, entries_of, saved_cell
+from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import outdated
-from rcilab.app.goal.goal_actions import MoveJoint, PoseGoal
+from rcilab.app.goal.goal_actions import CancelSearch, MoveJoint, PlanGoal, PoseGoal, SetPathType, SetSpeed
 from rcilab.app.request import Request, TypeField
 from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.setup.setup_actions import OpenTab, PressSetup
+from rcilab.app.text import Text
 from rcilab.app.view_actions import SetView
 from rcilab.cell.cell import Cell
 from rcilab.cell.cell_storage import pack_cell
@@ -95,6 +97,36 @@ def test_an_obstacle_in_the_way_is_refused_and_the_verdict_follows_it(bench, ask
     ask(RobotCommand(what="execute"))
     wait(lambda: abs(bench.session.status().q_c[0] - bench.store.state.model.home[0]) < 1e-3, "the arm at home")
     wait(lambda: bench.session.status().phase == "idle", "the end of the motion")
+
+
+def test_a_path_around_an_obstacle_is_searched_checked_and_cancelled(bench, ask):
+    model, goal = bench.store.state.model, np.array(bench.store.state.goal.q)
+    goal[0] += 1.2
+    ask(MoveJoint(joint=0, angle=float(goal[0])))
+    middle = bench.store.state.plan.motion.at(0.5 * bench.store.state.plan.motion.duration).q
+    ask(EditCell(what="add", name="box"))
+    place = tuple(model.forward(middle).position)
+    ask(MoveEntry(index=0, position=place, wxyz=(1.0, 0.0, 0.0, 0.0), ended=True))
+    ask(SetPathType(kind="free"))
+    try:
+        wait(lambda: checked(bench, True), "a path around it")
+        plan = bench.store.state.plan
+        assert plan.kind == "free"
+        assert np.allclose(plan.motion.goal, goal)
+        assert bench.store.state.search is None
+        ask(PressCheck(what="slow"))
+        ask(SetSpeed(speed=0.9))
+        wait(lambda: bench.store.state.search is not None, "the next search")
+        ask(CancelSearch())
+        assert (bench.store.state.search, bench.store.state.no_plan.code) == (None, "plan.search_cancelled")
+        ask(MoveEntry(index=0, position=tuple(model.forward(goal).position), wxyz=(1.0, 0.0, 0.0, 0.0), ended=True))
+        ask(PlanGoal())
+        wait(lambda: bench.store.state.no_plan.code == "plan.failed", "that the goal is not free")
+        assert "link" in Text("en").render(bench.store.state.no_plan) or "tool" in Text("en").render(
+            bench.store.state.no_plan
+        )
+    finally:
+        ask(SetPathType(kind="joint"))
 
 
 def test_entries_are_typed_renamed_attached_copied_and_taken_back(bench, ask):

@@ -16,7 +16,7 @@ from rcilab.app.check.report_rows import passed_sentence, row_facts, row_tone, r
 from rcilab.app.check.slowdown_job import scaled, slow_to_goal
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import GoalActions
-from rcilab.app.planning import Plan, build_plan_view
+from rcilab.app.planning import Plan, build_plan_view, make_plan
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import PlanProgram, ProgramActions
 from rcilab.app.program.program_draft import Draft, number_at
@@ -150,13 +150,25 @@ def test_a_way_into_the_floor_is_mended_by_no_slow_down() -> None:
 
 
 def test_where_a_lower_speed_does_it_the_plan_is_made_anew_with_that(bench: Bench) -> None:
-    slower = slow_to_goal(bench.plan, 1.0, "s_profile", lambda share: None)
+    slower = slow_to_goal(bench.plan, 1.0, "s_profile", None, lambda share: None)
     assert slower.plan is not None
     assert not slower.is_stretched
     assert slower.plan.motion.speed == pytest.approx(slower.scale)
     assert broken(slower.plan) == set()
     assert can_slow_down_help(bench.plan.report)
     assert not can_slow_down_help(slower.plan.report)
+
+
+def test_a_line_that_is_slowed_down_stays_a_line() -> None:
+    start = np.array(HOME)
+    goal = MODEL.inverse(MODEL.forward(HOME) @ Pose((0.0, 0.15, 0.0)), psi=MODEL.arm_angle(HOME), near=HOME)[0]
+    line = make_plan(MODEL, start, goal, 1.0, "jerk_limited", kind="line")
+    assert isinstance(line, Plan)
+    slower = slow_to_goal(line.completed(), 1.0, "jerk_limited", None, lambda share: None)
+    assert slower.plan is not None
+    path = slower.plan.path
+    along = path[-1] - path[0]
+    assert np.linalg.norm(np.cross(path - path[0], along / np.linalg.norm(along)), axis=1).max() < 1e-4
 
 
 def test_a_slow_down_is_offered_only_where_it_meets_every_recommendation(bench: Bench) -> None:

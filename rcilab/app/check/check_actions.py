@@ -125,7 +125,7 @@ class CheckActions:
             self._store.notify("warn", message("notice.moving"))
             return
         if plan.program is None:
-            run = partial(slow_to_goal, plan, state.speed, state.law)
+            run = partial(slow_to_goal, plan, state.speed, state.law, state.via)
         elif state.program.planned is state.program.draft:
             run = partial(slow_program, plan, state.program.draft, state.program.rounds)
         else:

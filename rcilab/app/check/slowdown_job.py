@@ -16,6 +16,7 @@ from rcilab.motion import plan_program
 
 if TYPE_CHECKING:
     from rcilab.conformance.time_scaling import SlowDown
+    from rcilab.core.spatial import Pose
     from rcilab.motion.joint import JointLaw
 
 _TRIES = 2
@@ -39,11 +40,12 @@ class SlowdownJob:
     """Whether the whole curve is slowed down, because no speed is slow enough: the speed does not bound the jerk."""
 
 
-def slow_to_goal(plan: Plan, speed: float, law: JointLaw, progress: ProgressCallback) -> SlowdownJob:
-    """Returns a new plan to the same goal at the highest speed that conforms."""
+def slow_to_goal(plan: Plan, speed: float, law: JointLaw, via: Pose | None, progress: ProgressCallback) -> SlowdownJob:
+    """Returns a new plan to the same goal, on the same kind of path, at the highest speed that conforms."""
+    start, goal, kind = plan.motion.start, plan.motion.goal, plan.kind
 
     def make(scale: float) -> Plan | None:
-        made = make_plan(plan.model, plan.motion.start, plan.motion.goal, scale * speed, law, plan.box)
+        made = make_plan(plan.model, start, goal, scale * speed, law, plan.box, kind, via, plan.cell)
         return replace(made, missed_by=plan.missed_by).completed(cell=plan.cell) if isinstance(made, Plan) else None
 
     return _slower(plan, make, SLOWEST / speed, progress)

@@ -19,7 +19,10 @@ from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.run.plan_readiness import ArmStatus, is_done, is_moving
 from rcilab.app.state_store import StateStore
 from rcilab.core.arrays import JointVector, readonly_copy
+from rcilab.core.background_job import BackgroundJob, ProgressCallback
+from rcilab.core.errors import RcilabError
 from rcilab.core.spatial import Pose
+from rcilab.i18n.error_messages import describe_error
 from rcilab.i18n.number_parsing import parse_number, parse_quaternion
 from rcilab.i18n.translator import Message, message
 from rcilab.motion.joint import JOINT_LAWS
@@ -103,7 +106,7 @@ class SetPathType(Request):
     """Path type to the goal; None leaves a value unchanged."""
 
     kind: str | None = None
-    """"joint", "line" or "arc"."""
+    """"joint", "line", "arc" or "free"."""
     via: bool = False
     """Whether the current target becomes the via point of the arc."""
 
@@ -111,6 +114,11 @@ class SetPathType(Request):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanGoal(Request):
     """Plan from the arm's position to the goal, and check it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CancelSearch(Request):
+    """Cancel the search for a path around obstacles."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,6 +167,7 @@ class GoalActions:
         self._stale = False  # The goal has changed during a motion.
         self._planned = 0.0  # [s] Time of the last plan.
         self._due: float | None = None  # [s] Time at which a tool path is to be planned.
+        self._search: BackgroundJob[None, Plan | Message] = BackgroundJob("search")
         self._is_held = False  # The gizmo is being dragged.
         self._rested = 0.0  # [s] Time before which a change of the cell is not checked.
         self._dragged, self._dragged_at = "", 0.0  # What was dragged last, and when, [s].
@@ -174,6 +183,7 @@ class GoalActions:
             ChooseBranch: self.choose_branch,
             SetPathType: self.set_path_type,
             PlanGoal: self.plan,
+            CancelSearch: self.cancel_search,
             PlanRecovery: self.plan_recovery,
             SetSpeed: self.set_speed,
             SetLaw: self.set_law,
@@ -333,6 +343,7 @@ class GoalActions:
             return
         state, status = self._store.state, self._robot.status()
         self._due = None
+        self._drop_search()
         if is_moving(status):
             self._stale = True
             return
@@ -342,31 +353,45 @@ class GoalActions:
             if request is not None:  # Nothing has changed: the plan is kept.
                 self._store.notify("warn", message("plan.no_arm"))
             elif state.recording is None:  # A displayed run stays, whatever the goal is.
-                self._store.update(
-                    plan=None, no_plan=message("plan.no_arm"), recording=None, playhead=0.0, playing=False
-                )
+                self._show_without_plan(message("plan.no_arm"))
             return
         if state.path_type != "joint" and request is None:
             self._due = time.monotonic() + SETTLED
-            self._store.update(plan=None, no_plan=message("plan.soon"), recording=None, playhead=0.0, playing=False)
+            self._show_without_plan(message("plan.soon"))
             return
         self._make(state, readonly_copy(start), is_asked=request is not None)
 
     def _make(self, state: AppState, start: JointVector, *, is_asked: bool) -> None:
-        made = self.prepare_plan(start)()
+        if state.path_type == "free":
+            self._search.start(None, self.prepare_plan(start))
+            self._store.update(search=0.0)
+            self._show_without_plan(message("plan.searching"))
+            return
+        made = self.prepare_plan(start)(_ignore)
         self._planned = time.monotonic()
         is_program = state.plan is not None and state.plan.program is not None
         if is_program and not is_asked and state.plan is not None and not is_done(state.plan, start):
             self._store.notify("warn", message("plan.replaced"))
         self.show(made)
 
-    def prepare_plan(self, start: JointVector) -> Callable[[], Plan | Message]:
+    def prepare_plan(self, start: JointVector) -> Callable[[ProgressCallback], Plan | Message]:
         """Returns a function that plans from joint angles, [rad], to the current goal; any thread may call it."""
         state = self._store.state
-        box, missed_by = state.box, state.goal.reach.missed_by
+        box, missed_by, cell = state.box, state.goal.reach.missed_by, state.cell_for(state.model)
 
-        def make() -> Plan | Message:
-            made = make_plan(state.model, start, state.goal.q, state.speed, state.law, box, state.path_type, state.via)
+        def make(progress: ProgressCallback) -> Plan | Message:
+            made = make_plan(
+                state.model,
+                start,
+                state.goal.q,
+                state.speed,
+                state.law,
+                box,
+                state.path_type,
+                state.via,
+                cell,
+                progress,
+            )
             return replace(made, missed_by=missed_by) if isinstance(made, Plan) else made
 
         return make
@@ -387,10 +412,43 @@ class GoalActions:
             return
         if self._store.state.watched and made.code == "plan.here":
             made = message("plan.watched")
-        self._store.update(plan=None, no_plan=made, recording=None, playhead=0.0, playing=False)
+        self._show_without_plan(made)
+
+    def _show_without_plan(self, why: Message) -> None:
+        self._store.update(plan=None, no_plan=why, recording=None, playhead=0.0, playing=False)
+
+    def cancel_search(self, request: CancelSearch) -> None:
+        """Cancels the search for a path around obstacles."""
+        if self._search.progress is not None:
+            self._drop_search()
+            self._show_without_plan(message("plan.search_cancelled"))
+
+    def close(self) -> None:
+        """Cancels the search."""
+        self._search.cancel()
+
+    def _drop_search(self) -> None:
+        if self._search.progress is not None:
+            self._search.cancel()
+            self._store.update(search=None)
+
+    def _follow_search(self) -> None:
+        """Shows the progress or the result of the search, unless another plan has been shown meanwhile."""
+        no_plan = self._store.state.no_plan
+        if self._store.state.plan is not None or no_plan is None or no_plan.code != "plan.searching":
+            self._drop_search()
+        elif self._search.is_done:
+            _, made = self._search.pop_result()
+            self._store.update(search=None)
+            self._planned = time.monotonic()
+            self.show(message("plan.failed", error=describe_error(made)) if isinstance(made, RcilabError) else made)
+        elif self._search.progress != self._store.state.search:
+            self._store.update(search=self._search.progress)
 
     def settle(self) -> None:
-        """Checks for collisions, too, once the goal has not changed for a moment."""
+        """Checks for collisions, too, once the goal has not changed for a moment; follows a search."""
+        if self._search.progress is not None:
+            self._follow_search()
         state = self._store.state
         if self._due is not None and time.monotonic() >= self._due:
             self.plan(PlanGoal())
@@ -447,6 +505,10 @@ class GoalActions:
         if self._plans_at_once:
             self._store.changed.set()
             time.sleep(_DRAW_FIRST)
+
+
+def _ignore(share: float) -> None:
+    """Takes the progress of a plan that is ready at once."""
 
 
 def _beginning(plan: Plan) -> JointVector:

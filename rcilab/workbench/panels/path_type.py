@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.goal.goal_actions import PlanGoal, SetLaw, SetPathType, SetSpeed
+from rcilab.app.goal.goal_actions import CancelSearch, PlanGoal, SetLaw, SetPathType, SetSpeed
 from rcilab.app.planning import PATH_TYPES
 from rcilab.app.text import Text
 from rcilab.motion.joint import JOINT_LAWS
@@ -46,6 +46,9 @@ class PathTypePanel:
             self._law = BoundControl(law, ask, lambda v, p: SetLaw(page=p, law=laws.get(v, "")))
             self._plan = gui.add_button(text("target.plan"), icon="route", hint=text("target.plan_hint"))
             on_press(self._plan, ask, lambda page: PlanGoal(page=page))
+            self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
+            self._cancel = gui.add_button(text("program.cancel"), icon="x", color="gray", visible=False)
+            on_press(self._cancel, ask, lambda page: CancelSearch(page=page))
             self._problem, self._planned = Html(gui), Html(gui)
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
@@ -54,6 +57,11 @@ class PathTypePanel:
         self._way.show(self._ways[state.path_type])
         self._via.visible = state.path_type == "arc"
         self._note.show(_note_html(state, text))
+        is_searching = state.search is not None
+        if self._bar.visible != is_searching:
+            self._bar.visible = self._cancel.visible = is_searching
+        if state.search is not None:
+            self._bar.value = round(100.0 * state.search, 1)
         self._speed.show(round(state.speed * 100.0))
         self._field.show(shown(state.speed * 100.0), state.problems.get("speed"), state.entered)
         self._problem.show(problems_html(state, text, [("speed", text("target.speed"))]))
