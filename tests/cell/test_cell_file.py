@@ -166,11 +166,12 @@ def schema():
 @pytest.mark.parametrize("name", ["pick_place", "machine_tending", "polishing"])
 def test_an_example_is_free_at_home_and_fits_the_schema(schema, name: str) -> None:
     schema.validate(json.loads((ROOT / f"rcilab/cell/examples/{name}.json").read_text(encoding="utf-8")))
-    cell = Cell.example(name)
-    model = cell.applied_to(rcilab.load_model(cell.model))
-    motion = rcilab.plan_joint(model, model.home, model.home + 1e-3)
-    report = rcilab.check(motion, model, cell=cell)
-    assert report.ok, str(report)
+    example = Cell.example(name)
+    for cell in (example, *(example.holding(part.name) for part in example.parts)):
+        model = cell.applied_to(rcilab.load_model(cell.model))
+        motion = rcilab.plan_joint(model, model.home, model.home + 1e-3)
+        report = rcilab.check(motion, model, cell=cell)
+        assert report.ok, str(report)
 
 
 def test_a_written_cell_fits_the_schema_and_wrong_ones_do_not(schema, folder: Path) -> None:
