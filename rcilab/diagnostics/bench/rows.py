@@ -31,6 +31,8 @@ ROWS = MappingProxyType(
         "check": "compute",
         "check_full": "compute",
         "check_joint_rows": "compute",
+        "check_cell": "cell",
+        "plan_free": "cell",
         "controller_ideal": "controller",
         "controller_mujoco": "controller",
         "controller_cartesian": "controller",
