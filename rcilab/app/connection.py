@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from rcilab.cell.cell import Cell
     from rcilab.conformance.certificate import Certificate
     from rcilab.control_process import PendingRequest, Supervisor, SupervisorStatus
     from rcilab.core.state import Mode
@@ -113,9 +114,14 @@ class PageConnection(Protocol):
         ...
 
     def open(
-        self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotConfiguration | None = None
+        self,
+        model: RobotModel,
+        target: str,
+        plant: str = "ideal",
+        setup: RobotConfiguration | None = None,
+        cell: Cell | None = None,
     ) -> None:
-        """Closes the present robot and connects to this one; returns at once."""
+        """Closes the present robot and connects to this one; a virtual one gets a cell. Returns at once."""
         ...
 
     def disconnect(self) -> None:

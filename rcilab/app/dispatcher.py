@@ -180,6 +180,7 @@ class Dispatcher:
         if self._thread is not None:
             self._thread.join(10.0)
         self._goal.close()
+        self._cell.close()
         self._jog.release()
         self._push.close()
         self._world.close()

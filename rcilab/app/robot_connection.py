@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 
 from rcilab.app.arm_features import explain_missing_robot
 from rcilab.app.status_text import StartingError
+from rcilab.cell.convex_parts import prepare_meshes
 from rcilab.control_process import Supervisor, SupervisorStatus
 from rcilab.control_process.process_supervisor import failed_start
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.core.memory import memory_needed
 
 if TYPE_CHECKING:
+    from rcilab.cell.cell import Cell
     from rcilab.makers.configuration import RobotConfiguration
     from rcilab.model.robot_model import RobotModel
 
@@ -40,7 +42,12 @@ class RobotConnection:
         self._wants_connection = False
 
     def open(
-        self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotConfiguration | None = None
+        self,
+        model: RobotModel,
+        target: str,
+        plant: str = "ideal",
+        setup: RobotConfiguration | None = None,
+        cell: Cell | None = None,
     ) -> None:
         """Closes the open supervisor and starts one for this arm, destination and plant; returns at once.
 
@@ -58,7 +65,7 @@ class RobotConnection:
             generation, previous = self._generation, self._worker
             self._ready = self._shown = self._failure = None
             self._wants_connection, self.name = True, target
-            self._work(self._replace, generation, previous, model, target, plant, setup)
+            self._work(self._replace, generation, previous, model, target, plant, setup, cell)
 
     def disconnect(self) -> None:
         """Closes the open supervisor and starts nothing; returns at once, `status` is "closed" from then on."""
@@ -160,6 +167,7 @@ class RobotConnection:
         target: str,
         plant: str,
         setup: RobotConfiguration | None,
+        cell: Cell | None,
     ) -> None:
         self._close_current(previous)
         with self._lock:
@@ -167,7 +175,9 @@ class RobotConnection:
                 return
         try:
             with memory_needed():
-                supervisor = Supervisor(model, target, plant, setup=setup)
+                if cell is not None:
+                    prepare_meshes(cell)  # Takes seconds once, for which the start of the controller does not wait.
+                supervisor = Supervisor(model, target, plant, setup=setup, cell=cell)
                 self._current = self._shown = supervisor
                 supervisor.start()
         except RcilabError as error:

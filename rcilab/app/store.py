@@ -52,6 +52,8 @@ class UiState(AppState):
     """The address that awaits a second confirmation."""
     reboot_asked: bool = False
     """Whether the question about a restart of the controller awaits its answer."""
+    solid: Cell | None = None
+    """The cell that the virtual controller was started with."""
     jog: JogState = field(default_factory=JogState)
     setup: SetupState = field(default_factory=SetupState)
     """Safety box, tool, load, force-control frame; `model` has this tool and this load."""

@@ -46,11 +46,20 @@ def convex_parts(mesh: MeshShape) -> tuple[ConvexPart, ...]:
 
 def prepare_meshes(cell: Cell) -> None:
     """Computes the convex parts of all meshes of a cell, unless they are known: it takes seconds for each."""
-    solids = () if cell.tool is None else cell.tool.solids_at()
-    held = () if cell.part is None else cell.part.solids
-    for shape in (*(obstacle.shape for obstacle in cell.obstacles), *(solid.shape for solid in (*solids, *held))):
-        if isinstance(shape, MeshShape):
-            convex_parts(shape)
+    for shape in _meshes(cell):
+        convex_parts(shape)
+
+
+def has_meshes(cell: Cell) -> bool:
+    """Returns whether a cell has meshes to prepare."""
+    return bool(_meshes(cell))
+
+
+def _meshes(cell: Cell) -> list[MeshShape]:
+    carried = () if cell.tool is None else cell.tool.solids_at()
+    held = [solid for part in cell.parts for solid in part.solids]
+    shapes = (*(obstacle.shape for obstacle in cell.obstacles), *(solid.shape for solid in (*carried, *held)))
+    return [shape for shape in shapes if isinstance(shape, MeshShape)]
 
 
 def _decompose(mesh: MeshShape) -> tuple[ConvexPart, ...]:

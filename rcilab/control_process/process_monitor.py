@@ -7,6 +7,7 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from rcilab.cell.cell import Cell
 from rcilab.control_process.launch import START_TIMEOUT
 from rcilab.control_process.layout import ControlBlock, Counter
 from rcilab.control_process.messages import Connect, Request, WorkerSettings
@@ -41,11 +42,14 @@ class ProcessMonitor:
         address: Address of an external controller; None starts a virtual one.
         setup: The configuration to send at every connection.
         auto_restart: Whether a process that ended unexpectedly is restarted automatically.
+        cell: Cell of the virtual controller; None without one.
     """
 
-    def __init__(self, plant: str, address: str | None, setup: ConfigurationSync, *, auto_restart: bool) -> None:
+    def __init__(
+        self, plant: str, address: str | None, setup: ConfigurationSync, *, auto_restart: bool, cell: Cell | None = None
+    ) -> None:
         self._plant, self._address, self._setup = plant, address, setup
-        self._auto_restart = auto_restart
+        self._auto_restart, self._cell = auto_restart, cell
         self.lock = threading.RLock()
         self.block: ControlBlock | None = None
         self.incident: Incident | None = None
@@ -62,7 +66,7 @@ class ProcessMonitor:
         block = ControlBlock.create(model.n, settings)
         try:
             self.processes = ProcessSupervisor(
-                block, model.name, self._plant, self._address, auto_restart=self._auto_restart
+                block, model.name, self._plant, self._address, auto_restart=self._auto_restart, cell=self._cell
             )
             self._client, self.reader = RequestClient(block), StatusReader(block, maker)
         except BaseException:

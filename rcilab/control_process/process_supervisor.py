@@ -6,8 +6,11 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+from rcilab.cell.cell import Cell
 from rcilab.control_process.launch import START_TIMEOUT, VirtualController
 from rcilab.control_process.layout import ControlBlock, Counter
 from rcilab.control_process.managed_process import ManagedProcess, parent_pid
@@ -21,6 +24,7 @@ ANSWER_TIMEOUT = 3.0  # [s] For the connection and for every response of the con
 LOAD_TIMEOUT = START_TIMEOUT  # [s] For the control process to load; the same as for the virtual controller.
 FROZEN_AFTER = 1.0  # [s] Without a heartbeat of the control process; longer than any of its waits.
 END_TIMEOUT = 3.0  # [s] For the control process to stop the arm and exit; the longest stop takes 0.4 s.
+_CELL_FILE = "cell.zip"
 _RESTARTS, _RESTART_WINDOW = 3, 60.0  # Largest number of automatic restarts, and within which time, [s].
 
 
@@ -55,16 +59,26 @@ class ProcessSupervisor:
         plant: Plant of the virtual controller: "ideal" or "mujoco".
         address: Address of an external controller; None starts a virtual one.
         auto_restart: Whether a process that ended is restarted automatically (at most 3 times a minute).
+        cell: Cell of the virtual controller; None without one.
     """
 
     def __init__(
-        self, block: ControlBlock, model_name: str, plant: str, address: str | None, *, auto_restart: bool
+        self,
+        block: ControlBlock,
+        model_name: str,
+        plant: str,
+        address: str | None,
+        *,
+        auto_restart: bool,
+        cell: Cell | None = None,
     ) -> None:
         self._block = block
         self._model_name = model_name
         self._plant = plant
         self._external_address = address
         self._auto_restart = auto_restart
+        self._cell = cell
+        self._folder: TemporaryDirectory[str] | None = None  # Of the cell's file.
         self._worker: ManagedProcess | None = None
         self._worker_started = 0.0
         self._controller: VirtualController | None = None
@@ -119,6 +133,9 @@ class ProcessSupervisor:
             worker.wait(END_TIMEOUT)
             worker.end()
         self._end_controller()
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
         self.address = None
 
     def _start_controller(self) -> None:
@@ -127,7 +144,16 @@ class ProcessSupervisor:
         has_delay = maker is not None and "mode_delay" in maker.capabilities.options
         prefill = [] if is_patient else ["--prefill", str(SUPERVISED_PREFILL)]
         delay = ["--mode-delay", str(MODE_DELAY)] if has_delay else []
-        self._controller = VirtualController(self._model_name, self._plant, options=[*prefill, *delay])
+        options = [*prefill, *delay, *self._cell_options()]
+        self._controller = VirtualController(self._model_name, self._plant, options=options)
+
+    def _cell_options(self) -> list[str]:
+        if self._cell is None:
+            return []
+        if self._folder is None:
+            self._folder = TemporaryDirectory(prefix="rcilab-")
+            self._cell.save(Path(self._folder.name) / _CELL_FILE)
+        return ["--cell", str(Path(self._folder.name) / _CELL_FILE)]
 
     def _start_worker(self) -> None:
         counters = self._block.counters

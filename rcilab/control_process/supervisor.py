@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rcilab.cell.cell import Cell
 from rcilab.conformance.free_elbow import resulting_motion
 from rcilab.conformance.speed_scaling_check import plan_start_with_override
 from rcilab.control_process.configuration_sync import ConfigurationSync, standard_setup
@@ -76,6 +77,7 @@ class Supervisor(Closeable):
         auto_restart: Whether a process that ended unexpectedly is restarted automatically (at most 3 times a minute).
         setup: The configuration to send at every connection. None: the model's tool and load to a virtual controller,
             nothing to a real one, which has its own.
+        cell: Cell of the virtual controller, solid in "mujoco"; None without one.
 
     Raises:
         InvalidValueError: The target is not a valid address, the model is not a robot model, or the plant is unknown.
@@ -90,6 +92,7 @@ class Supervisor(Closeable):
         stop_without_operator: bool = True,
         auto_restart: bool = True,
         setup: RobotConfiguration | None = None,
+        cell: Cell | None = None,
     ) -> None:
         self.model = require_driver(require_model(model))
         require_plant(plant)
@@ -99,7 +102,7 @@ class Supervisor(Closeable):
         self.model = require_parts(self.model, setup).applied_to(self.model)
         self._setup = ConfigurationSync(setup)
         address = None if self._target == VIRTUAL else self._target
-        self._monitor = ProcessMonitor(plant, address, self._setup, auto_restart=auto_restart)
+        self._monitor = ProcessMonitor(plant, address, self._setup, auto_restart=auto_restart, cell=cell)
         self._lock = self._monitor.lock
         self._stop_without_operator = stop_without_operator
         self._jogging: PendingRequest | None = None

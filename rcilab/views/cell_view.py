@@ -5,16 +5,12 @@ Node names: /cell/obstacle0, /cell/frame0 and so on. Tool and part are drawn on 
 
 from __future__ import annotations
 
-from functools import lru_cache
-
-import numpy as np
-
 from rcilab.cell.cell import Cell
 from rcilab.cell.entries import Obstacle
-from rcilab.cell.shapes import Box, Cylinder, MeshShape, Plane, Shape, Solid
+from rcilab.cell.shape_mesh import carried_solids, shape_mesh, solid_mesh
+from rcilab.cell.shapes import Plane
 from rcilab.core.spatial import Pose
-from rcilab.robots.mesh import Mesh, merge_meshes, revolve
-from rcilab.views.configuration_view import unit_ball
+from rcilab.robots.mesh import Mesh, merge_meshes
 from rcilab.views.scene import Color, Scene
 
 OBSTACLE_COLOR: Color = (148, 158, 172)
@@ -22,7 +18,6 @@ WORKPIECE_COLOR: Color = (96, 150, 190)
 TOUCHED_COLOR: Color = (214, 48, 38)
 
 _AXES = 0.1  # [m] Length of the drawn axes of a frame.
-_WALL = 2.0  # [m] Half the edge of the drawn part of an infinite wall.
 _WALL_OPACITY = 0.35
 
 
@@ -96,56 +91,10 @@ class CellView:
 
 def carried_mesh(cell: Cell | None, T_flange_tool: Pose) -> Mesh | None:
     """Returns tool and held part of a cell as one mesh in the flange frame; None if the arm carries neither."""
-    if cell is None:
-        return None
-    solids = [] if cell.tool is None else list(cell.tool.solids_at())
-    if cell.part is not None:
-        solids += cell.part.at_flange(T_flange_tool)[1]
+    solids = (
+        [] if cell is None else [solid for group in carried_solids(cell, T_flange_tool).values() for solid in group]
+    )
     return merge_meshes([solid_mesh(solid) for solid in solids]) if solids else None
-
-
-def solid_mesh(solid: Solid) -> Mesh:
-    """Returns a solid as a mesh, in the frame of what it belongs to."""
-    mesh, pose = shape_mesh(solid.shape), solid.pose
-    return Mesh(mesh.vertices @ pose.rotation.T + pose.position, mesh.faces)
-
-
-@lru_cache(maxsize=256)
-def shape_mesh(shape: Shape) -> Mesh:
-    """Returns a shape as a mesh in its frame; of an infinite wall, a square."""
-    if isinstance(shape, MeshShape):
-        return Mesh(shape.vertices, shape.faces)
-    if isinstance(shape, Box):
-        return _box(shape.size)
-    if isinstance(shape, Cylinder):
-        half = 0.5 * shape.length
-        return revolve([(0.0, -half), (shape.radius, -half), (shape.radius, half), (0.0, half)])
-    if isinstance(shape, Plane):
-        return _box((2.0 * _WALL, 2.0 * _WALL, 0.01)).moved((0.0, 0.0, -0.005))
-    ball = unit_ball()
-    return Mesh(ball.vertices * shape.radius, ball.faces)
-
-
-def _box(size: tuple[float, ...]) -> Mesh:
-    """Returns a box with sharp edges."""
-    corners, faces = [], []
-    for axis in range(3):
-        for side in (-0.5, 0.5):
-            u, v = (axis + 1) % 3, (axis + 2) % 3
-            square = np.zeros((4, 3))
-            square[:, axis] = side
-            square[:, u] = (-0.5, 0.5, 0.5, -0.5)
-            square[:, v] = (-0.5, -0.5, 0.5, 0.5)
-            start = 4 * len(faces)
-            turn = (0, 1, 2, 3) if side > 0.0 else (0, 3, 2, 1)
-            corners.append(square)
-            faces.append(
-                [
-                    [start + turn[0], start + turn[1], start + turn[2]],
-                    [start + turn[0], start + turn[2], start + turn[3]],
-                ]
-            )
-    return Mesh(np.concatenate(corners) * size, np.concatenate(np.array(faces, dtype=np.int32)))
 
 
 def _color(cell: Cell, obstacle: Obstacle, touched: str) -> Color:

@@ -13,12 +13,12 @@ import trimesh
 
 from rcilab.app.cell.cell_actions import AddMesh, EditCell, LoadCell, MoveEntry, SelectEntry, SetCell
 from rcilab.app.cell.cell_edit import base_pose_of
-from rcilab.app.cell.cell_state import Entry, entries_of, saved_cell
+from rcilab.app.cell.cell_state import Entry, entries_of, is_cell_pending, saved_cell
 from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import outdated
 from rcilab.app.goal.goal_actions import CancelSearch, MoveJoint, PlanGoal, PoseGoal, SetPathType, SetSpeed
 from rcilab.app.request import Request, TypeField
-from rcilab.app.run.run_actions import RobotCommand
+from rcilab.app.run.run_actions import ChooseRobot, RobotCommand
 from rcilab.app.setup.setup_actions import OpenTab, PressSetup
 from rcilab.app.text import Text
 from rcilab.app.view_actions import SetView
@@ -206,6 +206,7 @@ def test_a_mesh_becomes_an_obstacle_and_one_in_millimetres_is_scaled(bench, ask)
     for unit, edge in ((1.0, 0.2), (1000.0, 200.0)):
         ask(EditCell(what="clear"))
         ask(AddMesh(name="casting.stl", content=trimesh.creation.box((edge, edge, edge)).export(file_type="stl")))
+        wait(lambda: bench.store.state.cell.cell is not None, "the mesh to be prepared")
         (obstacle,) = cell_of(bench).obstacles
         assert (obstacle.name, type(obstacle.shape)) == ("casting", MeshShape)
         np.testing.assert_allclose(np.ptp(obstacle.shape.vertices, axis=0), edge / unit, rtol=1e-5)
@@ -234,3 +235,24 @@ def test_the_cell_comes_back_after_a_restart(tmp_path, bench, ask):
     again = Autosave(tmp_path / "kept.json")
     again.recall(model)
     again.close(replace(state, cell=replace(state.cell, cell=Cell(model=model.name, obstacles=(wall,)))))
+
+
+def test_the_simulated_arm_is_stopped_by_the_cell_that_it_was_started_with(bench, ask):
+    ask(EditCell(what="add", name="box"))
+    assert not is_cell_pending(bench.store.state), "the ideal arm has no contacts"
+    ask(ChooseRobot(plant="mujoco"))
+    try:
+        wait(
+            lambda: bench.session.status().phase == "idle" and bool(bench.session.status().powered), "the simulated arm"
+        )
+        assert not is_cell_pending(bench.store.state)
+        assert bench.store.state.solid is bench.store.state.cell_for(bench.store.state.model)
+        ask(MoveEntry(index=0, position=(0.9, 0.0, 0.2), wxyz=(1.0, 0.0, 0.0, 0.0), ended=True))
+        assert is_cell_pending(bench.store.state)
+        before = bench.session.robot()
+        ask(ChooseRobot(plant="mujoco"))
+        wait(lambda: bench.session.is_ready and bench.session.robot() is not before, "another controller")
+        assert not is_cell_pending(bench.store.state)
+    finally:
+        ask(ChooseRobot(plant="ideal"))
+        wait(lambda: bench.session.status().phase == "idle" and bool(bench.session.status().powered), "the ideal arm")

@@ -35,9 +35,11 @@ from rcilab.app.store import Store
 from rcilab.app.text import Text
 from rcilab.cell.cell import Cell
 from rcilab.cell.cell_storage import read_uploaded
-from rcilab.cell.entries import WORLD
+from rcilab.cell.convex_parts import has_meshes, prepare_meshes
+from rcilab.cell.entries import WORLD, Obstacle
 from rcilab.cell.mesh_file import read_mesh
 from rcilab.cell.shapes import MeshShape
+from rcilab.core.background_job import BackgroundJob
 from rcilab.core.errors import RcilabError
 from rcilab.core.spatial import Pose
 from rcilab.i18n.error_messages import describe_error
@@ -132,6 +134,7 @@ class CellActions:
         self._store, self._setup = store, setup
         self._arm = store.state.model.name
         self._histories: dict[str, _History] = {self._arm: _History()}
+        self._preparation: BackgroundJob[Callable[[], None], None] = BackgroundJob("cell")
         self._drag: tuple[object, ...] | None = None
         self._dragged = -math.inf  # Time of the last drag event, [s].
 
@@ -160,7 +163,8 @@ class CellActions:
             other = message("cell.file_other", file=name, theirs=cell.model, ours=model)
             self._store.set_problem(FILE_FIELD, other)
             return
-        self._take(cell, message("cell.loaded", name=name, count=len(cell.obstacles)))
+        sentence = message("cell.loaded", name=name, count=len(cell.obstacles))
+        self._when_prepared(cell, lambda: self._take(cell, sentence))
 
     def add_mesh(self, request: AddMesh) -> None:
         """Adds an obstacle from a file with a mesh."""
@@ -173,7 +177,9 @@ class CellActions:
         if shape.scale != 1.0:
             self._store.notify("good", message("cell.scaled", name=name))
         self._store.clear_problems(FILE_FIELD)
-        self._place(lambda cell: with_shape(cell, Path(name).stem or name, shape))
+        stem = Path(name).stem or name
+        alone = Cell(model=self._arm, obstacles=(Obstacle(name=stem, shape=shape),))
+        self._when_prepared(alone, lambda: self._place(lambda cell: with_shape(cell, stem, shape)))
 
     def edit(self, request: EditCell) -> None:
         """Handles a button."""
@@ -267,11 +273,25 @@ class CellActions:
         if cell.model == self._arm:
             self._set(cell=cell)
 
+    def close(self) -> None:
+        """Drops what is being prepared."""
+        self._preparation.cancel()
+
     def tick(self) -> None:
-        """Follows the choice of another arm."""
+        """Follows the choice of another arm, and the preparation of meshes."""
+        if self._preparation.is_done:
+            self._store.update(busy=None)
+            act, result = self._preparation.pop_result()
+            if isinstance(result, RcilabError):
+                self._store.notify("bad", explain_error(result))
+            else:
+                act()
         name = self._store.state.model.name
         if name == self._arm:
             return
+        if self._preparation.progress is not None:
+            self._preparation.cancel()
+            self._store.update(busy=None)
         self._arm, self._drag = name, None
         history = self._histories.setdefault(name, _History())
         self._store.update(cell=CellState(cell=history.cell))
@@ -314,6 +334,14 @@ class CellActions:
             return
         self._store.clear_problems(request.field)
         self._change(change(parsed.value))
+
+    def _when_prepared(self, cell: Cell, act: Callable[[], None]) -> None:
+        """Acts once the meshes of a cell can be checked: the convex parts of a new one take seconds."""
+        if not has_meshes(cell):
+            act()
+            return
+        self._preparation.start(act, lambda progress: prepare_meshes(cell))
+        self._store.update(busy=message("cell.preparing"))
 
     def _example(self, name: str) -> None:
         """Loads a cell that comes with rcilab, for the chosen arm."""

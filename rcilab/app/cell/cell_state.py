@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from rcilab.cell.cell import Cell
 from rcilab.cell.tool import Tool
 from rcilab.core.spatial import Pose
 from rcilab.model.dynamics.payload import NO_LOAD
 from rcilab.model.robot_model import RobotModel
+
+if TYPE_CHECKING:
+    from rcilab.app.store import UiState
 
 EntryKind = Literal["obstacle", "frame"]
 
@@ -58,6 +61,16 @@ def checked_cell(cell: Cell, model: RobotModel) -> Cell:
         return cell
     tool = replace(cell.tool or Tool(), T_flange_tool=model.T_flange_tool, payload=model.load)
     return replace(cell, tool=tool, parts=tuple(replace(part, payload=NO_LOAD) for part in cell.parts))
+
+
+def solid_cell(state: UiState) -> Cell | None:
+    """Returns the cell that a virtual controller starts with: that of the MuJoCo plant, which has contacts."""
+    return state.cell_for(state.model) if state.target == "virtual" and state.plant == "mujoco" else None
+
+
+def is_cell_pending(state: UiState) -> bool:
+    """Returns whether the virtual controller was started with another cell."""
+    return not state.watched and solid_cell(state) is not state.solid
 
 
 def saved_cell(cell: Cell, model: RobotModel) -> Cell:

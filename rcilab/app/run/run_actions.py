@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
+from rcilab.app.cell.cell_state import is_cell_pending, solid_cell
 from rcilab.app.connection import PageConnection
 from rcilab.app.goal.goal import Goal, Tone, goal_at
 from rcilab.app.request import Handlers, Moving, Request
@@ -164,16 +165,17 @@ class RunActions:
         self.open(model.name, target)
 
     def _choose_plant(self, plant: str) -> None:
-        """Restarts the virtual controller with another plant; goal and plan are kept."""
+        """Restarts the virtual controller with another plant, or with the cell of now; goal and plan are kept."""
         state = self._store.state
-        if plant not in PLANT_KINDS or plant == state.plant:
+        if plant not in PLANT_KINDS or (plant == state.plant and not is_cell_pending(state)):
             return
         if state.target != "virtual":
             self._store.notify("warn", message("plant.address", address=state.target))
             return
-        self._store.update(plant=plant, playing=False, **_unasked(state))
+        cell = solid_cell(replace(state, plant=plant))
+        self._store.update(plant=plant, solid=cell, playing=False, **_unasked(state))
         self._forget_robot()
-        self._connection.open(state.model, state.target, plant, _own_setup(state, state.target))
+        self._connection.open(state.model, state.target, plant, _own_setup(state, state.target), cell)
 
     def disconnect(self) -> None:
         """Disconnects, and ends our own controller; goal and plan are kept, for the preview."""
@@ -201,8 +203,9 @@ class RunActions:
             changes |= {"drive": replace(state.drive, control=None, refusal=None)}
             state = replace(state, model=model, setup=setup, drive=replace(state.drive, control=None))
         # First: from here on no state of the old arm is shown on the new one.
-        self._connection.open(model, target, state.plant, _own_setup(state, target))
-        self._store.update(playhead=0.0, playing=False, **changes)
+        cell = solid_cell(replace(state, target=target))
+        self._connection.open(model, target, state.plant, _own_setup(state, target), cell)
+        self._store.update(playhead=0.0, playing=False, solid=cell, **changes)
 
     def _forget_robot(self) -> None:
         self.requests.forget()

@@ -26,6 +26,7 @@ from rcilab.recording.client_motions import ClientMotion, ClientMotions, MotionP
 from rcilab.sim.setup_requests import as_setup
 
 if TYPE_CHECKING:
+    from rcilab.cell.cell import Cell
     from rcilab.core.fault import FaultCode
     from rcilab.sim.api import WorldStatus
 
@@ -157,7 +158,12 @@ class WatchedController:
         ).coded("only_watched", address=self.name)
 
     def open(
-        self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotConfiguration | None = None
+        self,
+        model: RobotModel,
+        target: str,
+        plant: str = "ideal",
+        setup: RobotConfiguration | None = None,
+        cell: Cell | None = None,
     ) -> None:
         """Raises an error, see `robot`."""
         self.robot()

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.app.cell.cell_actions import FLOOR_FIELD, SetCell
 from rcilab.app.cell.cell_edit import SIZE_FIELDS, obstacle_of, parent_of, read_field
-from rcilab.app.cell.cell_state import Entry, entries_of, selected_entry
+from rcilab.app.cell.cell_state import Entry, entries_of, is_cell_pending, selected_entry
 from rcilab.app.goal.goal import POSE_FIELDS
+from rcilab.app.run.plan_readiness import is_moving
+from rcilab.app.run.run_actions import ChooseRobot
 from rcilab.app.text import Text
 from rcilab.cell.entries import WORLD
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, shown
+from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -131,6 +133,10 @@ class CellRestPanel:
             self._floor = NumberField(self._box, ask, FLOOR_FIELD, text.unit("mm"))
             self._problems = Html(gui)
             self._note = Html(gui)
+            self._start = gui.add_button(
+                text("cell.start"), icon="refresh", hint=text("cell.start_hint"), visible=False
+            )
+            on_press(self._start, ask, lambda page: ChooseRobot(page=page, plant="mujoco"))
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the cell."""
@@ -150,7 +156,13 @@ class CellRestPanel:
         self._problems.show(problems_html(state, text, [(FLOOR_FIELD, text("cell.floor"))]))
         tool = None if cell is None else cell.tool
         sentence = text("cell.no_tool") if tool is None else text("cell.tool_is", name=tool.name)
-        self._note.show(f'<p class="rl-note">{esc(sentence)}</p>')
+        is_pending = is_cell_pending(state)
+        if self._start.visible != is_pending:
+            self._start.visible = is_pending
+        self._start.disabled = is_moving(status)
+        is_ideal = cell is not None and state.is_virtual and state.plant == "ideal"
+        words = (sentence, text("cell.pending") if is_pending else text("cell.ideal") if is_ideal else "")
+        self._note.show("".join(f'<p class="rl-note">{esc(one)}</p>' for one in words if one))
 
     def _part_of(self, label: str) -> str:
         return "" if label == self._nothing else label
