@@ -161,7 +161,7 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
     """Appends the motions with their outcomes to `moves` and returns the name of the arm."""
     from rcilab.conformance.check import check
     from rcilab.execution.command_validation import find_start_mismatch
-    from rcilab.makers.maker import commanded_start
+    from rcilab.makers.maker import start_tolerance_of
     from rcilab.model.robot_model import load_model
     from rcilab.motion import Program
     from rcilab.recording.export import require_ending
@@ -187,8 +187,7 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
             raise UsageError(
                 f"{args.file} has {motion.n} joints and {robot.model.name} has {robot.model.n}: it is for another arm"
             )
-        start = commanded_start(motion.q[0], state.q_c, robot.model)
-        mismatch = find_start_mismatch(motion.q[0], start, _TO_START)
+        mismatch = find_start_mismatch(motion.q[0], state.q_c, start_tolerance_of(robot.model), _TO_START)
         if not args.to_start:  # Before the report, whose violations would all have this cause.
             _require_ready(mismatch, robot, state)
         if mismatch is None:

@@ -16,7 +16,7 @@ from rcilab.core.arrays import JointVector
 from rcilab.core.errors import CertificateError, PlanningError, RcilabError, UsageError
 from rcilab.core.state import Mode, require_mode
 from rcilab.execution.command_validation import find_start_mismatch
-from rcilab.makers.maker import commanded_start
+from rcilab.makers.maker import commanded_start, start_tolerance_of
 from rcilab.motion import Motion, require_motion
 from rcilab.motion.speed_scaling import SpeedScaledMotion
 
@@ -59,7 +59,7 @@ def require_admissible(
     q_c = commanded_start(motion.q[0], q_c, model)
     if certificate is None:
         raise CertificateError("the motion has not been checked: check(motion, model) first", ["certificate"])
-    mismatch = find_start_mismatch(motion.q[0], q_c)
+    mismatch = find_start_mismatch(motion.q[0], q_c, start_tolerance_of(model))
     if mismatch is not None:
         raise CertificateError(mismatch, ["start state"])
     certificate.verify(motion, model, q_c, box, mode=mode)

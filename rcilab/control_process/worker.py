@@ -56,7 +56,7 @@ from rcilab.execution.motion_executor import HELD_TOO_LONG, LONGEST_PAUSE, Motio
 from rcilab.execution.recorder import CycleLog
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import StreamingDriver, open_driver
-from rcilab.makers.maker import capabilities_of, commanded_start, timing_of
+from rcilab.makers.maker import capabilities_of, start_tolerance_of, timing_of
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import plan_stop
 from rcilab.realtime.cpu_latency import awake_cores
@@ -427,7 +427,7 @@ class MotionService:
         rows = self._block.motion[: request.rows]
         mode = request.mode
         if driver.latest is not None:
-            mismatch = find_start_mismatch(rows[0], commanded_start(rows[0], driver.latest.q_c, model))
+            mismatch = find_start_mismatch(rows[0], driver.latest.q_c, start_tolerance_of(model))
             if mismatch is not None:
                 raise UsageError(mismatch).coded("elsewhere")
             model.rigid_body.motion_torque(driver.latest.q, driver.latest.dq, driver.latest.dq)  # Warm-up.

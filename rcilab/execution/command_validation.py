@@ -22,7 +22,6 @@ _ARRIVED = 1e-12  # [rad] Commanded angles return over the wire unchanged, excep
 _POSE_ARRIVED = 1e-9  # [m], or an element of a rotation: a controller may normalise the pose.
 _LONGEST_TOOL = 0.5  # [m] Tuning value: a longer one is another pose rather than another tool.
 _TOOL_STEP, _TOOL_ROUNDING = 1e-4, 1e-6  # [m] Tools are given in tenths of a millimetre; positions may be rounded.
-_START = np.format_float_scientific(START_POSITION_TOLERANCE, trim="-", exp_digits=1)  # "1e-9"
 _START_ADVICE = (
     "plan the motion from robot.state.q_c, or move the arm to its start first: "
     "robot.execute(plan_joint(robot.model, robot.state.q_c, motion.q[0]))"
@@ -57,32 +56,42 @@ def require_command(command: Any, kind: type[Command], n: int, t: float) -> Comm
     return CartesianPosition(T, command.psi, command.finished)
 
 
-def find_start_mismatch(start: JointVector, q_c: JointVector, advice: str = _START_ADVICE) -> str | None:
+def find_start_mismatch(
+    start: JointVector, q_c: JointVector, tolerance: float = START_POSITION_TOLERANCE, advice: str = _START_ADVICE
+) -> str | None:
     """Returns a message if a motion does not start at the arm's position, or None.
 
     Args:
         start: Start of the motion, shape (n,), [rad].
         q_c: Commanded joint angles of the arm, [rad].
+        tolerance: Largest distance, [rad]: that of the arm, `start_tolerance_of`.
         advice: End of the message: what to do.
     """
     if len(start) != len(q_c):
         return f"the motion is for {len(start)} joints and the arm has {len(q_c)}; plan it for the right model"
     off = np.abs(np.asarray(start) - q_c)
-    if float(off.max()) <= START_POSITION_TOLERANCE:
+    if float(off.max()) <= tolerance:
         return None
     joint = int(off.argmax())
-    others = int((off > START_POSITION_TOLERANCE).sum()) - 1
+    others = int((off > tolerance).sum()) - 1
+    shown = np.format_float_scientific(tolerance, precision=1, trim="-", exp_digits=1)  # "1e-9"
     more = f" (and {others} more joint{'s' if others > 1 else ''})" if others else ""
     return (
         f"the motion does not start at the arm's position: joint {joint + 1} starts at "
         f"{math.degrees(start[joint]):.4f} deg and is at {math.degrees(q_c[joint]):.4f} deg, "
-        f"{math.degrees(off[joint]):.2g} deg apart{more} (tolerance {_START} rad); "
+        f"{math.degrees(off[joint]):.2g} deg apart{more} (tolerance {shown} rad); "
         f"{advice}"
     )
 
 
 def require_start(
-    command: Command, state: RobotState, limits: Limits, *, has_psi: bool, T_flange_tool: Pose = IDENTITY
+    command: Command,
+    state: RobotState,
+    limits: Limits,
+    *,
+    has_psi: bool,
+    T_flange_tool: Pose = IDENTITY,
+    resolution: float = 0.0,
 ) -> None:
     """Rejects a first command that differs from the commanded state: the arm would jump.
 
@@ -92,39 +101,41 @@ def require_start(
         limits: Bounds of the arm: the first torques may differ from zero by one cycle's rate.
         has_psi: Whether the arm has a redundancy; its angle is then checked.
         T_flange_tool: The tool of the controller, for the cause of a difference.
+        resolution: Rounding of commanded positions in states, [rad] or [m].
 
     Raises:
         InvalidValueError: It differs; the message names the joint, both values and the tolerance.
     """
+    tolerance = max(START_TOLERANCE, resolution)
     if isinstance(command, JointPosition):
         off = np.abs(command.q - state.q_c)
         joint = int(off.argmax())
-        if off[joint] > START_TOLERANCE:
+        if off[joint] > tolerance:
             raise InvalidValueError(
                 "first command",
                 np.degrees(command.q).round(3).tolist(),
                 f"deg must be the present position: joint {joint + 1} is commanded to "
                 f"{math.degrees(command.q[joint]):.4f} deg and is at {math.degrees(state.q_c[joint]):.4f} deg, "
-                f"{math.degrees(off[joint]):.4f} deg apart (tolerance {math.degrees(START_TOLERANCE):.5f} deg); "
+                f"{math.degrees(off[joint]):.4f} deg apart (tolerance {math.degrees(tolerance):.5f} deg); "
                 "begin with state.q_c",
             )
     elif isinstance(command, CartesianPosition):
         off = float(np.abs(command.T_base_tool - state.T_base_tool_c.matrix).max())
-        if off > START_TOLERANCE:
+        if off > tolerance:
             raise InvalidValueError(
                 "first command",
                 command.T_base_tool[:3, 3].tolist(),
-                f"must be the present pose: an element differs by {off:.3g} (tolerance {START_TOLERANCE:g}); "
+                f"must be the present pose: an element differs by {off:.3g} (tolerance {tolerance:g}); "
                 f"begin with state.T_base_tool_c{_describe_other_tool(command, state, T_flange_tool)}",
             )
         if command.psi is not None and has_psi:
             off = abs(math.remainder(command.psi - state.psi_c, math.tau))
-            if off > START_TOLERANCE:
+            if off > tolerance:
                 raise InvalidValueError(
                     "psi of the first command",
                     round(math.degrees(command.psi), 4),
                     f"deg must be the present one: the arm angle is {math.degrees(state.psi_c):.4f} deg, "
-                    f"{math.degrees(off):.4f} deg apart (tolerance {math.degrees(START_TOLERANCE):.5f} deg); begin "
+                    f"{math.degrees(off):.4f} deg apart (tolerance {math.degrees(tolerance):.5f} deg); begin "
                     "with state.psi_c, or with None to hold it",
                 )
     else:

@@ -435,7 +435,14 @@ class ControlLoop:
             command = stage.step(command)
         if is_first:
             tool = self._model.T_flange_tool
-            require_start(command, state, self._limits, has_psi=self._has_psi, T_flange_tool=tool)
+            require_start(
+                command,
+                state,
+                self._limits,
+                has_psi=self._has_psi,
+                T_flange_tool=tool,
+                resolution=self._driver.resolution,
+            )
         return command
 
     def _time(self, state: RobotState) -> float:

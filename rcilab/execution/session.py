@@ -52,6 +52,7 @@ from rcilab.makers.maker import (
     find_missing_feature,
     require_feature,
     require_parts,
+    start_tolerance_of,
     timing_of,
 )
 from rcilab.model.dynamics.payload import POINT_MASS
@@ -374,7 +375,7 @@ class RobotSession(Closeable):
         require_speed_override(speed_override)
         with self._lock.begin_motion("execute"):
             start = commanded_start(motion.q[0], self.receive_state().q_c, self.model)
-            mismatch = find_start_mismatch(motion.q[0], start)
+            mismatch = find_start_mismatch(motion.q[0], start, start_tolerance_of(self.model))
             if mismatch is not None:
                 raise UsageError(mismatch)
             if certificate is None:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, get_args
 
 import numpy as np
 
+from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
 from rcilab.core.arrays import JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import ConditionTable
@@ -220,6 +221,11 @@ def state_rounding_of(model: RobotModel) -> float:
     """Returns the largest rounding of commanded positions in the states of an arm, see `Maker.state_rounding`."""
     maker = maker_of(model)
     return 0.0 if maker is None else maker.state_rounding(model)
+
+
+def start_tolerance_of(model: RobotModel) -> float:
+    """Returns the largest distance of a motion's start from the commanded angles in the states of an arm, [rad]."""
+    return max(START_POSITION_TOLERANCE, state_rounding_of(model))
 
 
 def commanded_start(start: JointVector, q_c: JointVector, model: RobotModel) -> JointVector:

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rcilab.core.command import CartesianPosition
+from rcilab.core.command import CartesianPosition, JointPosition
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.execution.command_validation import describe_distance, distance_to, find_start_mismatch, require_start
+from rcilab.makers.maker import start_tolerance_of
 from rcilab.model.robot_model import load_model
 
 LIMITS = load_model("xMatePro7").limits
@@ -56,3 +57,13 @@ def test_the_tolerance_of_a_start_is_a_number_to_read() -> None:
     said = find_start_mismatch(np.full(7, 1e-6), np.zeros(7))
     assert said is not None
     assert "(tolerance 1e-9 rad)" in said
+
+
+def test_a_start_has_the_tolerance_of_the_states() -> None:
+    rounded, tolerance = np.full(6, 1e-5), start_tolerance_of(load_model("RM65"))
+    state: Any = SimpleNamespace(q_c=np.zeros(6))
+    assert find_start_mismatch(rounded, np.zeros(6), tolerance) is None
+    require_start(JointPosition(rounded), state, LIMITS, has_psi=False, resolution=tolerance)
+    assert "(tolerance 1.7e-5 rad)" in str(find_start_mismatch(2.0 * rounded, np.zeros(6), tolerance))
+    with pytest.raises(InvalidValueError, match=r"tolerance 0\.00100 deg"):
+        require_start(JointPosition(2.0 * rounded), state, LIMITS, has_psi=False, resolution=tolerance)

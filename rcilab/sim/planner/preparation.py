@@ -9,7 +9,14 @@ from math import tau
 import numpy as np
 
 from rcilab.core.arrays import Array
-from rcilab.core.errors import InvalidValueError, KinematicsError, PlanningError, RcilabError, SingularError
+from rcilab.core.errors import (
+    InvalidValueError,
+    KinematicsError,
+    PlanningError,
+    RcilabError,
+    SingularError,
+    UnreachableError,
+)
 from rcilab.core.limits import JointLimits, Limits
 from rcilab.core.spatial import Pose, rotation_between
 from rcilab.i18n.translator import Remark
@@ -118,6 +125,9 @@ class Sampling:
                 return
             self._add_pose(pose)
             self.refusal = find_outside(q, self._ends, share) or find_jump(near, q, share)
+            of_end = None if self.refusal is None else self._error_at_end(near)
+            if isinstance(of_end, UnreachableError) and of_end.distance > 0.0:  # In any range of the joints.
+                self.refusal = refusal_of(of_end, 1.0)
             self.rows.append(q)
 
     def _error_at_end(self, near: Sequence[float]) -> KinematicsError | None:

@@ -77,25 +77,25 @@ def _delete_work_frame(controller: RealManController, request: Request) -> None:
     controller.change(replace(settings, work_frames=MappingProxyType(frames), work_frame=current))
 
 
-def _read_tool(request: Request) -> ToolFrame:
+def _read_tool(controller: RealManController, request: Request) -> ToolFrame:
     x, y, z = (_MICRO * value for value in request.integers("position", 3))
     return ToolFrame(
         T_flange_tool=pose_from_wire(request.integers("tool_pose", 6)),
         mass=_GRAMS * request.integer("payload", 0),
         center=(x, y, z),
-    ).require()
+    ).require(controller.model.description.rated_payload)
 
 
 def _add_tool(controller: RealManController, request: Request) -> None:
     name = _name(request, "tool_name")
     _require_new(name, controller.settings.tool_frames)
-    controller.change(controller.settings.with_tool(name, _read_tool(request)))
+    controller.change(controller.settings.with_tool(name, _read_tool(controller, request)))
 
 
 def _update_tool(controller: RealManController, request: Request) -> None:
     name = _require_known(controller, request, "tool_name")
     _require_changeable(name, FIRST_TOOL_FRAME)
-    controller.change(controller.settings.with_tool(name, _read_tool(request)))
+    controller.change(controller.settings.with_tool(name, _read_tool(controller, request)))
 
 
 def _change_tool(controller: RealManController, request: Request) -> None:

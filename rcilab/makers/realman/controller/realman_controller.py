@@ -227,6 +227,7 @@ class RealManController:
             parameters = replace(parameters, load=setup.load)
         if setup.q is not None:
             require_stand(arm.model.with_tool(parameters.T_flange_tool), setup.q, parameters, arm.plant)
+        arm.model.with_load(parameters.load)  # Before anything changes.
         tool = ToolFrame(
             T_flange_tool=parameters.T_flange_tool,
             mass=parameters.load.mass,

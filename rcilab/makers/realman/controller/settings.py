@@ -18,7 +18,6 @@ from rcilab.makers.realman.bounds import (
     ANGULAR_SPEED,
     FIRST_TOOL_FRAME,
     FIRST_WORK_FRAME,
-    HEAVIEST_LOAD,
     INPUTS,
     LINE_ACCELERATION,
     LINE_SPEED,
@@ -53,16 +52,19 @@ class ToolFrame:
         """The tool as a point mass."""
         return NO_LOAD if not self.mass else Payload(mass=self.mass, center_of_mass=np.array(self.center))
 
-    def require(self) -> ToolFrame:
+    def require(self, rated_payload: float) -> ToolFrame:
         """Returns it.
+
+        Args:
+            rated_payload: Of the arm, [kg].
 
         Raises:
             InvalidValueError: It is too long or too heavy.
         """
         if hypot(*self.T_flange_tool.parts[1]) > LONGEST_TOOL or hypot(*self.center) > LONGEST_TOOL:
             raise InvalidValueError("tool frame", self.T_flange_tool, f"must be within {LONGEST_TOOL:g} m")
-        if not 0.0 <= self.mass <= HEAVIEST_LOAD:
-            raise InvalidValueError("payload", self.mass, f"must be 0 to {HEAVIEST_LOAD:g} kg")
+        if not 0.0 <= self.mass <= rated_payload:
+            raise InvalidValueError("payload", self.mass, f"must be 0 to {rated_payload:g} kg, the rated payload")
         return self
 
 

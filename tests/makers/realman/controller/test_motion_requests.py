@@ -230,6 +230,13 @@ def test_what_cannot_be_reached_is_refused_with_its_error_until_the_next_command
     assert bench.run_until_event()["trajectory_state"] is True
 
 
+def test_a_goal_out_of_reach_is_named_also_where_a_joint_limit_comes_first():
+    bench = Bench("RM75")
+    bench.ask("movel", pose=[3000000, 0, 0, *bench.pose[3:]], v=50)
+    assert bench.run_until_event()["trajectory_state"] is False
+    assert bench.err == [RealManError.UNREACHABLE.code]
+
+
 @pytest.mark.parametrize("mode", [0, 1, 2])
 def test_streamed_angles_are_followed_without_an_answer(mode):
     bench = Bench()

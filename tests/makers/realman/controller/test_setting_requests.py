@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from rcilab.core.errors import InvalidValueError
+from rcilab.model.dynamics.payload import Payload
+from rcilab.sim.arm_setup import ArmSetup
 from tests.makers.realman.controller.bench import Bench
 
 
@@ -66,3 +70,33 @@ def test_the_geometry_is_that_of_the_arm():
     assert bench.ask("set_DH_data", **rows)["set_state"] is True
     assert bench.ask("set_DH_data", **{**rows, "joint_1": [-90000, 0, 250000, 0]})["set_state"] is False
     assert bench.ask("set_DH_data_default")["set_state"] is True
+
+
+@pytest.mark.parametrize(("model", "rated"), [("RM65", 5000), ("RML63-III", 3000)])
+def test_a_tool_heavier_than_the_rated_payload_is_refused(model: str, rated: int):
+    bench = Bench(model)
+    tool = {"tool_name": "grip", "tool_pose": [0, 0, 100000, 0, 0, 0], "position": [0, 0, 50000]}
+    assert bench.ask("set_manual_tool_frame", **tool, payload=rated + 1)["manual_tool_frame"] is False
+    assert "rated payload" in bench.logged[-1][1]
+    assert bench.ask("set_manual_tool_frame", **tool, payload=rated)["manual_tool_frame"] is True
+    assert bench.ask("set_change_tool_frame", tool_name="grip")["change_tool_frame"] is True
+    assert bench.ask("update_tool_frame", **tool, payload=rated + 1)["update_state"] is False
+    bench.run(2)
+    assert bench.controller.model.load.mass == rated / 1000
+    assert bench.ask("get_current_tool_frame")["payload"] == rated
+
+
+def test_a_load_that_the_arm_cannot_bear_changes_nothing():
+    bench = Bench()
+    heavy = Payload(mass=5.5, center_of_mass=np.zeros(3))
+    with pytest.raises(InvalidValueError):
+        bench.controller.set_up(ArmSetup(load=heavy))
+    bench.ask("set_arm_max_line_speed", arm_line_speed=100)  # The arm is configured again.
+    bench.run(2)
+    assert bench.ask("get_current_tool_frame")["payload"] == 0
+
+
+def test_a_mode_that_does_not_exist_is_refused():
+    bench = Bench()
+    assert bench.ask("set_arm_run_mode", mode=5)["mode"] is False
+    assert bench.ask("get_arm_run_mode")["mode"] == 1

@@ -9,6 +9,7 @@ from math import radians
 import numpy as np
 import pytest
 
+from rcilab.conformance.check import check
 from rcilab.core.command import JointPosition
 from rcilab.core.errors import (
     CommandRejectedError,
@@ -46,6 +47,14 @@ def test_a_checked_motion_arrives_and_each_target_is_that_of_its_state(robot, tm
     assert (sent["sent_ns"] >= sent["received_ns"]).all()
     run.save(tmp_path / "a.rcirun")
     assert len(load_run(tmp_path / "a.rcirun").cycles) == len(run.cycles)
+
+
+def test_a_motion_begins_at_the_goal_of_the_one_before_though_states_are_rounded(robot):
+    first = plan_joint(robot.model, robot.state.q_c, HOME + 0.0123456, speed=0.4)
+    second = plan_joint(robot.model, first.goal, HOME - 0.0123456, speed=0.4)
+    for motion in (first, second):
+        robot.execute(motion, check(motion, robot.model).require().certificate)
+        assert np.abs(robot.state.q - motion.goal).max() <= ROUNDING
 
 
 def test_a_motion_is_stopped_on_request_and_the_next_one_begins_there(robot):
