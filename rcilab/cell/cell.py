@@ -18,7 +18,7 @@ from rcilab.core.arrays import as_number, described
 from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import IDENTITY, Pose, as_pose
-from rcilab.model.dynamics.payload import combine_payloads
+from rcilab.model.dynamics.payload import NO_LOAD, combine_payloads
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.robots import describe_robot
 
@@ -168,6 +168,8 @@ class Cell:
     def applied_to(self, model: RobotModel) -> RobotModel:
         """Returns a model with the tool of the cell, and with the load of the tool and the part that it holds.
 
+        Without a tool in the cell, that of the model stays; a held part is then the whole load.
+
         Raises:
             InvalidValueError: It is another model than that of the cell.
         """
@@ -175,7 +177,7 @@ class Cell:
         if self.tool is None and self.part is None:
             return model
         T_flange_tool = model.T_flange_tool if self.tool is None else self.tool.T_flange_tool
-        load = model.load if self.tool is None else self.tool.payload
+        load = NO_LOAD if self.tool is None else self.tool.payload
         if self.part is not None:
             load = combine_payloads(load, self.part.at_flange(T_flange_tool)[0])
         return model.with_tool(T_flange_tool).with_load(load)

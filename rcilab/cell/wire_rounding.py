@@ -27,16 +27,18 @@ def without_rounding(model: RobotModel, cell: Cell) -> RobotModel:
         InvalidValueError: The cell is that of another arm, or its load is too heavy.
     """
     exact = cell.applied_to(model)
-    is_same = _is_same_tool(exact.T_flange_tool, model.T_flange_tool) and _is_same_load(exact.load, model.load)
+    is_same = is_same_tool(exact.T_flange_tool, model.T_flange_tool) and is_same_load(exact.load, model.load)
     return exact if is_same else model
 
 
-def _is_same_tool(tool: Pose, other: Pose) -> bool:
+def is_same_tool(tool: Pose, other: Pose) -> bool:
+    """Returns whether two poses in the flange frame differ only by rounding."""
     turned = rotation_between(tool.parts[0], other.parts[0])
     return bool(np.abs(tool.position - other.position).max() <= _POSITION and np.linalg.norm(turned) <= _ROTATION)
 
 
-def _is_same_load(load: Payload, other: Payload) -> bool:
+def is_same_load(load: Payload, other: Payload) -> bool:
+    """Returns whether a load as a controller reports it, `other`, differs from another one only by rounding."""
     has_inertia = bool(other.inertia.any())  # Not every interface has it.
     return bool(
         abs(load.mass - other.mass) <= _MASS

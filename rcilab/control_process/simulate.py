@@ -19,6 +19,7 @@ from rcilab.execution.session import RobotSession
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.makers.maker import capabilities_of, find_missing_feature, require_simulator
+from rcilab.model.dynamics.payload import NO_LOAD
 from rcilab.model.robot_model import RobotModel, load_model, require_model
 from rcilab.sim.controller_config import ControllerConfig, require_option, require_plant
 from rcilab.sim.streamed_motion import require_loss_behaviour
@@ -116,7 +117,8 @@ def _start(model: RobotModel, plant: str, lockstep: bool, options: list[str], ce
     if plant == "mujoco":
         prepare_meshes(cell)  # Takes seconds once, for which its start does not wait.
     if cell.tool is None:
-        cell = replace(cell, tool=Tool(T_flange_tool=model.T_flange_tool, payload=model.load))
+        load = model.load if cell.part is None else NO_LOAD  # That of the part alone, see `Cell.applied_to`.
+        cell = replace(cell, tool=Tool(T_flange_tool=model.T_flange_tool, payload=load))
     with TemporaryDirectory(prefix="rcilab-") as folder:
         file = Path(folder) / "cell.zip"
         cell.save(file)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import ArrayLike
 
 from rcilab.cell.cell import Cell, require_cell
+from rcilab.cell.wire_rounding import is_same_load, is_same_tool
 from rcilab.conformance.certificate import Certificate, require_certificate
 from rcilab.conformance.check import check
 from rcilab.conformance.free_elbow import resulting_motion
@@ -297,7 +298,7 @@ class RobotSession(Closeable):
 
         Args:
             cell: The cell of this arm; None: without one.
-            apply: Whether its tool, and the load of tool and held part, are sent to the controller.
+            apply: Whether its tool, and the load of tool and held part, are sent to a controller that has others.
 
         Raises:
             InvalidValueError: It is not a cell, or that of another arm.
@@ -307,8 +308,11 @@ class RobotSession(Closeable):
         if cell is not None:
             require_cell(cell).require_arm(self.model)
             if apply:
-                carried = cell.applied_to(self.model)
-                self.configure(RobotConfiguration(tool=carried.T_flange_tool, load=carried.load))
+                own, carried = self.model, cell.applied_to(self.model)
+                tool = None if is_same_tool(carried.T_flange_tool, own.T_flange_tool) else carried.T_flange_tool
+                self.configure(
+                    RobotConfiguration(tool=tool, load=None if is_same_load(carried.load, own.load) else carried.load)
+                )
         with self._lock.acquire("set_cell"):
             self._arm.cell = cell
 

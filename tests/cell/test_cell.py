@@ -71,6 +71,12 @@ def test_the_model_gets_tool_and_the_mass_of_tool_and_held_part() -> None:
     assert loaded.load.mass == 1.5
     np.testing.assert_allclose(loaded.load.center_of_mass, (0.01 / 3.0, 0.0, (0.1 + 0.1) / 1.5), atol=1e-12)
     assert loaded.T_flange_tool.is_close(tool.T_flange_tool)
+    bare = cell_with(parts=(part,)).holding("bolt")
+    for holding in (cell.holding("bolt"), bare):  # A model that has them already does not get them twice.
+        once = holding.applied_to(model)
+        assert holding.applied_to(once).load.mass == once.load.mass
+    assert bare.applied_to(loaded).T_flange_tool.is_close(tool.T_flange_tool)
+    assert bare.applied_to(loaded).load.mass == 0.5
     with pytest.raises(InvalidValueError, match="is that of xMatePro7, the model is FR3"):
         cell.applied_to(rcilab.load_model("FR3"))
 

@@ -144,6 +144,15 @@ def test_a_session_refuses_a_motion_through_a_wall_and_without_the_check_the_wal
         with pytest.raises(CertificateError, match=r"cell=robot\.cell"):
             robot.execute(back, rcilab.check(back, MODEL).certificate)
         robot.execute(back)
+        tooled = replace(WALLED, tool=TOOL)
+        robot.set_cell(tooled)
+        with pytest.raises(CertificateError, match=r"send those of the cell: robot\.set_cell\(cell, apply=True\)"):
+            robot.execute(away)
+        robot.set_cell(tooled, apply=True)
+        assert (robot.model.load.mass, robot.model.T_flange_tool) == (0.5, TOOL.T_flange_tool)
+        robot.execute(away)
+        robot.execute(back)
+        robot.set_cell(Cell(model="xMatePro7", tool=Tool()), apply=True)
         robot.set_cell(None)
         with pytest.raises(ControlError) as stopped:
             robot.execute(motion)
