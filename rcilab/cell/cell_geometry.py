@@ -176,8 +176,27 @@ class CellQuery:
         Args:
             q: Joint angles, shape (n,), [rad].
         """
-        distance, (first, second, _) = self._obstacles.nearest(q)
-        return distance, LinkPair(first, second, self._geometry.names[OBSTACLE - second] if second <= OBSTACLE else "")
+        distance, pair = self._obstacles.nearest(q)
+        return distance, self._named(pair)
+
+    def closest(self, q: JointVector) -> ClosestPoints | None:
+        """Returns where arm and obstacles are nearest to each other; None without an obstacle. q as of `cell`."""
+        found = self._obstacles.closest(q)
+        return None if found is None else found._replace(pair=self._named(found.pair))
+
+    def _named(self, pair: LinkPair) -> LinkPair:
+        first, second, _ = pair
+        return LinkPair(first, second, self._geometry.names[OBSTACLE - second] if second <= OBSTACLE else "")
+
+
+class ClosestPoints(NamedTuple):
+    """Where two bodies are nearest to each other."""
+
+    distance: float
+    """Below 0 for an overlap, [m]."""
+    pair: LinkPair
+    points: Array
+    """On the arm, and on the obstacle, in base, shape (2, 3), [m]."""
 
 
 class _Search:
@@ -206,6 +225,27 @@ class _Search:
             low[k], open_pairs[k] = found, np.inf
             if found < best:
                 best, pair = found, pairs.links[k]
+
+    def closest(self, q: JointVector) -> ClosestPoints | None:
+        self.nearest(q)
+        if not len(self._low):
+            return None
+        k = int(self._low.argmin())  # Those that are not computed are farther.
+        found = pin.computeDistance(self._geometry.model, self._solids, self._pairs.numbers[k])
+        points = np.stack([found.getNearestPoint1(), found.getNearestPoint2()])
+        return ClosestPoints(found.min_distance, self._pairs.links[k], points)
+
+
+def closest_points(model: RobotModel, cell: Cell, distance: ClearanceLimit, q: JointVector) -> ClosestPoints | None:
+    """Returns where an arm and the obstacles of a cell are nearest to each other; None without an obstacle.
+
+    Args:
+        model: The arm, with the tool of the cell.
+        cell: The cell.
+        distance: Required distances, with the floor of the cell.
+        q: Joint angles, shape (n,), [rad].
+    """
+    return CellQuery(cell_geometry(model, cell, distance)).closest(q)
 
 
 def cell_geometry(model: RobotModel, cell: Cell, distance: ClearanceLimit) -> CellGeometry:

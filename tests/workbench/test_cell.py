@@ -85,10 +85,15 @@ def test_an_obstacle_in_the_way_is_refused_and_the_verdict_follows_it(bench, ask
     worst = bench.store.state.plan.report.violations[0]
     assert (worst.condition.id, worst.links.obstacle) == ("clearance.cell", "Box")
     assert outdated(bench.store.state) is None
+    wait(lambda: bench.store.state.scene.closest is not None, "the line between them")
+    closest = bench.store.state.scene.closest
+    assert closest.pair.obstacle == "Box"
+    assert closest.distance < 0.0
     ask(RobotCommand(what="execute"))
     assert bench.session.status().phase == "idle", "a motion through an obstacle must not run"
     ask(MoveEntry(index=0, position=(-1.0, 0.0, 0.5), wxyz=(1.0, 0.0, 0.0, 0.0), ended=True))
     wait(lambda: checked(bench, True), "the plan to be safe again")
+    wait(lambda: bench.store.state.scene.closest is None, "no line")
     ask(RobotCommand(what="execute"))
     wait(lambda: abs(bench.session.status().q_c[0] - goal[0]) < 1e-3, "the arm at its goal")
     wait(lambda: bench.session.status().phase == "idle", "the end of the motion")

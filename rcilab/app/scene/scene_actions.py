@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Literal
 from rcilab.app.goal.elbow import compute_elbow
 from rcilab.app.goal.goal_actions import GoalActions, SetArmAngle
 from rcilab.app.request import Handlers, Request
+from rcilab.app.scene.closest import compute_closest
 from rcilab.app.scene.path_strip import compute_path_strip
 from rcilab.app.scene.scene_extras import EXTRAS, compute_ellipsoid, compute_swept_volume, compute_workspace
 from rcilab.app.store import Store
@@ -138,6 +139,7 @@ class SceneActions:
             self._change(elbow=compute_elbow(model, goal.q, box), peek=None)
         if self._is_new("ribbon", None if plan is None else plan.report):
             self._change(ribbon=None if plan is None else compute_path_strip(plan))
+            self._change(closest=None if plan is None else compute_closest(plan))
         if self._is_new("ellipsoid", *((model, goal.q) if "ellipsoid" in extras else ())):
             self._change(ellipsoid=compute_ellipsoid(model, goal.q) if "ellipsoid" in extras else None)
         self._compute("cloud", (model,) if "cloud" in extras else (), lambda: compute_workspace(model))

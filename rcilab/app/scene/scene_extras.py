@@ -15,6 +15,7 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.views.swept_volume import swept_mesh
 
 if TYPE_CHECKING:
+    from rcilab.cell.cell_geometry import ClosestPoints
     from rcilab.motion import Motion
     from rcilab.robots.mesh import Mesh
 
@@ -49,6 +50,8 @@ class SceneState:
     extras: frozenset[Extra] = frozenset(("elbow",))
     elbow: Elbow | None = None
     ribbon: PathStrip | None = None
+    closest: ClosestPoints | None = None
+    """Where the plan is too near to an obstacle."""
     peek: int | None = None
     """Which branch of the goal is under the mouse or has the focus, from 0."""
     ellipsoid: Ellipsoid | None = None

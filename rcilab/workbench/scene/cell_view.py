@@ -10,7 +10,8 @@ import numpy as np
 from rcilab.app.cell.cell_actions import MoveEntry, SelectEntry
 from rcilab.app.cell.cell_edit import base_pose_of
 from rcilab.app.cell.cell_state import Entry, entries_of, selected_entry
-from rcilab.views.cell_view import CellView
+from rcilab.app.text import Text
+from rcilab.views.cell_view import TOUCHED_COLOR, CellView
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench.panels.cell import touched_obstacle
 from rcilab.workbench.widgets import HAND_AWAY, Ask
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
 
     from rcilab.app.store import UiState
     from rcilab.cell.cell import Cell
+    from rcilab.cell.cell_geometry import ClosestPoints
 
+_LINE = "/cell_line"
 _SCALE = 0.2  # [m] Of the handles.
 
 
@@ -39,6 +42,8 @@ class CellSceneView:
         self._drawn: tuple[Cell | None, str] = (None, "")
         self._clickable: list[object] = []  # The shape of each obstacle whose mesh can be clicked.
         self._names: list[Any] = []
+        self._closest: ClosestPoints | None = None
+        self._distance: Any = None
         self._gizmo: Any = None
         self._edited: Entry | None = None
         self._touched = float("-inf")
@@ -48,8 +53,9 @@ class CellSceneView:
         """The nodes that can be dragged now."""
         return () if self._gizmo is None else (self._gizmo.name,)
 
-    def show(self, state: UiState) -> None:
+    def show(self, state: UiState, text: Text) -> None:
         """Draws what has changed."""
+        self._show_distance(state.scene.closest, text)
         cell = state.cell.cell
         drawn = (cell, touched_obstacle(state))
         if drawn[0] is not self._drawn[0] or drawn[1] != self._drawn[1]:
@@ -66,7 +72,25 @@ class CellSceneView:
         """Removes everything."""
         self._exchange_handles(None, None)
         self._name_frames(None)
+        self._show_distance(None, None)
         self._view.remove()
+
+    def _show_distance(self, closest: ClosestPoints | None, text: Text | None) -> None:
+        """Draws the shortest line between arm and obstacle, with its length."""
+        if closest is self._closest:
+            return
+        if self._closest is not None:
+            self._drawing.remove(_LINE)
+            self._distance.remove()
+        self._closest = closest
+        if closest is None or text is None:
+            return
+        self._drawing.add_polyline(_LINE, closest.points, color=TOUCHED_COLOR, thickness=0.012)
+        length = text.units.format(max(closest.distance, 0.0), "m.0f")
+        self._distance = self._server.scene.add_label(
+            "/cell_distance", length, position=closest.points.mean(axis=0), anchor="bottom-left",
+            depth_test=False, font_screen_scale=0.9,
+        )  # fmt: skip
 
     def _make_clickable(self, cell: Cell | None) -> None:
         shapes = [] if cell is None else [obstacle.shape for obstacle in cell.obstacles]

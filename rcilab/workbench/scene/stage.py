@@ -92,7 +92,7 @@ class Stage:
         self._extras.show(state)
         self._grip.show(state, status, text)
         self._setup.show(state, text)
-        self._cell.show(state)
+        self._cell.show(state, text)
         self._show_carried(state)
         self._watchers.show(
             state.control_lock, self._goal.handles + self._elbow.handles + self._setup.handles + self._cell.handles
