@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -41,11 +41,7 @@ _SPEED = 0.5
 def bench_check_cell() -> Measurement:
     """The check of a 7-joint motion of 10 s by all conditions, with a tool of 5000 triangles among 20 obstacles."""
     tool = _mesh_tool()
-    cell = Cell(
-        model=_ROBOT, tool=tool, floor=-0.8, obstacles=_random_obstacles(np.random.default_rng(_SEED), 0.9, 1.6)
-    )
-    prepare_meshes(cell)
-    model = cell.applied_to(load_model(_ROBOT))
+    cell, model = _full_cell(tool)
     motions = [motion_of(model, 10.0) for _ in range(10)]
     times = time_calls(lambda motion: check(motion, model, cell=cell), motions, warm_up=2)
     row = next(row for row in check(motions[0], model, cell=cell).rows if row.id == "clearance.cell")
@@ -56,6 +52,29 @@ def bench_check_cell() -> Measurement:
         f"{1e3 * row.value:.0f} mm"
     )
     return summarise("check_cell", times, "ms", 300.0, note)
+
+
+def bench_cell_drag() -> Measurement:
+    """The verdict on a motion of 2.5 s while one of 20 obstacles is dragged on the page, with that tool."""
+    from rcilab.app.planning import build_plan_view
+
+    cell, model = _full_cell(_mesh_tool())
+    motion = motion_of(model, 2.5)
+    plan = build_plan_view(model, motion, check(motion, model, distance=None)).completed(cell=cell)
+    first = cell.obstacles[0]
+    steps = [Pose((0.0, 0.01 * number, 0.0)) @ first.pose for number in range(12)]
+    cells = [cell.placed(replace(first, pose=pose)) for pose in steps]
+    times = time_calls(lambda moved: plan.completed(cell=moved), cells, warm_up=2)
+    note = f"{_ROBOT}, {len(cell.obstacles)} obstacles; {1.0 / np.median(times):.0f} verdicts a second"
+    return summarise("cell_drag", times, "ms", 100.0, note)
+
+
+def _full_cell(tool: Tool) -> tuple[Cell, RobotModel]:
+    """Returns an arm with a tool among 20 obstacles."""
+    obstacles = _random_obstacles(np.random.default_rng(_SEED), 0.9, 1.6)
+    cell = Cell(model=_ROBOT, tool=tool, floor=-0.8, obstacles=obstacles)
+    prepare_meshes(cell)
+    return cell, cell.applied_to(load_model(_ROBOT))
 
 
 def bench_plan_free() -> Measurement | Absent:

@@ -32,6 +32,7 @@ ROWS = MappingProxyType(
         "check_full": "compute",
         "check_joint_rows": "compute",
         "check_cell": "cell",
+        "cell_drag": "cell",
         "plan_free": "cell",
         "controller_ideal": "controller",
         "controller_mujoco": "controller",
