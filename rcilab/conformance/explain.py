@@ -215,7 +215,8 @@ def explain_place(found: ConditionResult | Violation, language: Language = "en")
     if found.links is not None:
         writer = _Writer(language)
         first, second, obstacle = found.links
-        return translate(language, "place.pair", first=_link(first, writer), second=obstacle or _link(second, writer))
+        other = translate(language, "place.obstacle", name=obstacle) if obstacle else _link(second, writer)
+        return translate(language, "place.pair", first=_link(first, writer), second=other)
     return explain_axis(found.condition, found.joint, language)
 
 

@@ -39,7 +39,7 @@ def test_a_motion_through_a_wall_is_refused_with_link_wall_distance_and_time() -
     assert worst.condition.id == "clearance.cell"
     assert "and wall: distance from an obstacle" in str(worst)
     assert "they overlap" in str(worst)
-    assert "wall" in report.explain("zh")
+    assert "与 “wall”重叠" in report.explain("zh")
 
 
 def test_a_tool_hits_what_the_arm_alone_does_not() -> None:
