@@ -23,6 +23,15 @@ def place_camera(server: viser.ViserServer) -> None:
     camera.position, camera.look_at, camera.fov = _CAMERA, _LOOK_AT, _FIELD_OF_VIEW
 
 
+VIEWS: dict[str, tuple[float, float, float] | None] = {
+    "home": None,
+    "top": (-1e-3, 0.0, 1.0),
+    "front": (1.0, 0.0, 0.0),
+    "side": (0.0, -1.0, 0.0),
+}
+"""Where the camera of a view is, seen from the arm; from the top, x points up. None: the initial position."""
+
+
 class ViserEnvironment:
     """The camera of a page: its initial position is farther away if the window or the panels leave little room.
 
@@ -34,16 +43,24 @@ class ViserEnvironment:
 
     def __init__(self, camera: viser.CameraHandle) -> None:
         self._camera = camera
-        self._placed = np.array(_CAMERA)
+        self._view, self._placed = "home", np.array(_CAMERA)
 
         @camera.on_update
         async def _(_camera: object) -> None:
-            if self._is_at(self._placed, _CAMERA) and not self._is_at(camera_position(camera.aspect)):
+            if (
+                self._view == "home"
+                and self._is_at(self._placed, _CAMERA)
+                and not self._is_at(camera_position(camera.aspect))
+            ):
                 self.reset()
 
-    def reset(self) -> None:
-        """Moves the camera to its initial position, upright."""
-        camera, self._placed = self._camera, camera_position(self._camera.aspect)
+    def reset(self, view: str = "home") -> None:
+        """Moves the camera to its initial position, upright, or to that of another of `VIEWS`."""
+        camera, self._view, self._placed = self._camera, view, camera_position(self._camera.aspect)
+        direction = VIEWS[view]
+        if direction is not None:
+            away = np.linalg.norm(self._placed - np.array(_LOOK_AT))
+            self._placed = np.array(_LOOK_AT) + away * np.array(direction)
         with camera.client.atomic():
             camera.position = self._placed
             camera.look_at = np.array(_LOOK_AT)

@@ -27,7 +27,7 @@ from rcilab.app.run.replay import replayed, require_replayable
 from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.run.watch_actions import WatchActions
 from rcilab.app.run.watched_controller import WatchedController
-from rcilab.app.scene.scene_actions import HighlightBranch
+from rcilab.app.scene.scene_actions import HighlightBranch, ShowExtra
 from rcilab.app.scene.scene_extras import SceneState
 from rcilab.app.setup.setup_actions import OpenTab
 from rcilab.app.status_text import explain_error
@@ -208,7 +208,7 @@ class Workbench:
         if isinstance(message, live.Here):
             self._here(page)
         elif isinstance(message, live.Home):
-            self._bring_back(page)
+            self._bring_back(page, message.view)
         else:
             if isinstance(message, live.Tab):
                 self.renderer.open_tab(page, message.index)
@@ -236,16 +236,18 @@ class Workbench:
                 return ChooseBranch(page=page, index=index)
             case live.Condition(id):
                 return PressCheck(page=page, what="row", row=id)
+            case live.Extra(name, on):
+                return ShowExtra(page=page, name=name, on=on)
             case live.Entry(index):
                 return SelectEntry(page=page, index=index)
             case live.Edit(what, key, index):
                 return EditProgram(page=page, what=what, key=key, index=index)
         raise AssertionError(message)
 
-    def _bring_back(self, page: int) -> None:
-        """Resets the camera of a page; those of other pages stay."""
+    def _bring_back(self, page: int, view: str) -> None:
+        """Moves the camera of a page to a view; those of other pages stay."""
         if page in self._views:
-            self._views[page].reset()
+            self._views[page].reset(view)
 
     def _here(self, page: int) -> None:
         """Registers a heartbeat of a page; only that of the operator counts for the robot."""

@@ -46,7 +46,16 @@ class Here(PageMessage):
 
 
 class Home(PageMessage):
-    """The page's camera is to be reset."""
+    """The page's camera is to be moved to a view."""
+
+    view: Literal["home", "top", "front", "side"] = "home"
+
+
+class Extra(PageMessage):
+    """Something that the scene shows besides is turned on or off."""
+
+    name: Literal["elbow", "frames", "ellipsoid", "cloud", "swept"]
+    on: bool
 
 
 class Seek(PageMessage):
@@ -124,6 +133,7 @@ _DECODER = msgspec.json.Decoder(
     | Stop
     | Here
     | Home
+    | Extra
     | Seek
     | Size
     | Tab

@@ -26,7 +26,19 @@ def decorate(index: bytes, quality: str = "full") -> bytes:
     """
     assets = files("rcilab.workbench") / "assets"
     style = (assets / "page.css").read_bytes()
-    scripts = ("heartbeat", "page", "marks", "names", "rows", "pick", "branches", "folds", "resend", "labels")
+    scripts = (
+        "heartbeat",
+        "page",
+        "marks",
+        "names",
+        "rows",
+        "pick",
+        "branches",
+        "folds",
+        "resend",
+        "labels",
+        "toolbar",
+    )
     script = b"\n".join((assets / f"{name}.js").read_bytes() for name in scripts)
     head = b"<style>" + style + b"</style><script>" + script + b"</script></head>"
     page = index.replace(b"<title>Viser</title>", b"<title>rcilab workbench</title>", 1)

@@ -140,3 +140,18 @@ def test_no_words_lie_on_others(page):
     finally:
         for label in labels:
             label.remove()
+
+
+def test_the_toolbar_turns_the_camera_and_shows_what_is_switched_on(page):
+    tab = page.tab
+    where = "() => __viserMutable.camera.position.toArray()"
+    tab.get_by_role("button", name="From the top").click()
+    page.wait(lambda: abs(tab.evaluate(where)[2]) > 2.0 * abs(tab.evaluate(where)[0]), "the camera above the arm")
+    frames = tab.locator("#rl-toolbar [aria-pressed]").nth(1)
+    frames.click()
+    page.wait(lambda: "frames" in page.state.scene.extras, "the frames")
+    page.wait(lambda: frames.get_attribute("aria-pressed") == "true", "the pressed button")
+    frames.click()
+    page.wait(lambda: "frames" not in page.state.scene.extras, "no frames")
+    tab.get_by_role("button", name="View of the whole arm").click()
+    page.wait(lambda: abs(tab.evaluate(where)[0]) > 0.5, "the first view")

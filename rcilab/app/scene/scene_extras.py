@@ -59,6 +59,11 @@ class SceneState:
     swept: Mesh | None = field(default=None, repr=False)
 
 
+def extras_of(model: RobotModel) -> tuple[Extra, ...]:
+    """Returns what the scene can show of an arm besides."""
+    return tuple(extra for extra in EXTRAS if extra != "elbow" or model.redundancy.kind == "arm_angle")
+
+
 def compute_ellipsoid(model: RobotModel, q: Array) -> Ellipsoid:
     """Returns the ellipsoid of linear manipulability at the tool (Yoshikawa 1985)."""
     axes, radii, _ = np.linalg.svd(model.jacobian(q)[:3], full_matrices=False)

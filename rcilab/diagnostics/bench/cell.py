@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rcilab.app.planning import build_plan_view
 from rcilab.cell.cell import Cell
 from rcilab.cell.clearance_query import DistanceQuery, build_query
 from rcilab.cell.convex_parts import convex_parts, prepare_meshes
@@ -56,8 +57,6 @@ def bench_check_cell() -> Measurement:
 
 def bench_cell_drag() -> Measurement:
     """The verdict on a motion of 2.5 s while one of 20 obstacles is dragged on the page, with that tool."""
-    from rcilab.app.planning import build_plan_view
-
     cell, model = _full_cell(_mesh_tool())
     motion = motion_of(model, 2.5)
     plan = build_plan_view(model, motion, check(motion, model, distance=None)).completed(cell=cell)

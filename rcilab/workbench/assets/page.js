@@ -214,6 +214,7 @@
     if (news.viser) document.documentElement.dataset.rlViser = news.viser;
     if (news.theme) document.documentElement.dataset.rlTheme = news.theme;
     if (news.language) document.documentElement.lang = news.language;
+    window.dispatchEvent(new CustomEvent("rl-news", { detail: news }));
   };
 
   // Once for a quality: a page that comes back as it was, from a cache, say, does not go round and round.

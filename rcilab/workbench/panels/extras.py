@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.app.request import Request
 from rcilab.app.scene.scene_actions import ShowExtra
-from rcilab.app.scene.scene_extras import EXTRAS, Extra
+from rcilab.app.scene.scene_extras import Extra, extras_of
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl
 
@@ -25,9 +25,7 @@ class ExtrasPanel:
         """Adds the switches."""
         self._switches: dict[Extra, BoundControl] = {}
         with gui.add_folder(self._text("extra.title")):
-            for extra in EXTRAS:
-                if extra == "elbow" and state.model.redundancy.kind != "arm_angle":
-                    continue
+            for extra in extras_of(state.model):
                 box = gui.add_checkbox(
                     self._text(f"extra.{extra}"), extra in state.scene.extras, hint=self._text(f"extra.{extra}_hint")
                 )

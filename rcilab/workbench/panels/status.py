@@ -9,9 +9,11 @@ from rcilab.app.run.drive_state import destination
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.played_motion import played_at
 from rcilab.app.run.readiness import time_shown
+from rcilab.app.scene.scene_extras import extras_of
 from rcilab.app.status_text import describe_status, phase_code
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
+from rcilab.views.viser_stage import VIEWS
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -38,6 +40,11 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         "stopHint": text("watch.stop" if state.watched else "stop.note"),
         "home": text("bar.home"),
         "homeHint": text("bar.home_hint"),
+        "views": [{"view": view, "label": text(f"view.{view}")} for view in VIEWS],
+        "extras": [
+            {"name": extra, "label": text(f"extra.{extra}"), "on": extra in state.scene.extras}
+            for extra in extras_of(state.model)
+        ],
         "lost": text("bar.lost"),
         "quality": state.quality,
         "software": text("bar.software") if state.quality == "full" else "",
