@@ -585,6 +585,8 @@ class RobotSession(Closeable):
     def stop(self, reason: str = ON_REQUEST) -> None:
         """Stops a running motion within the limits; `execute` or `control` then returns its run.
 
+        One that the controller plans is stopped if a call of this session waits for its end: that call raises an error.
+
         May be called from another thread or from a callback. Does nothing if no motion is being checked or is running.
 
         Args:

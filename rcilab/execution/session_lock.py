@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
-from rcilab.core.errors import UsageError
+from rcilab.core.errors import RcilabError, UsageError
 from rcilab.i18n.translator import Remark
 
 _CLOSED = Remark("the session was closed while a motion ran", "session_closed")
@@ -31,6 +31,7 @@ class SessionLock:
         self._motion_thread: int | None = None  # The thread that runs a motion.
         self._can_stop = False  # A motion is being checked or is running.
         self._reason: str | None = None  # Why the motion is being stopped.
+        self._stop_planned: Callable[[], object] | None = None  # Stops the motion if the controller plans it.
 
     @property
     def is_moving(self) -> bool:
@@ -90,13 +91,17 @@ class SessionLock:
                 self._can_stop = False
 
     @contextmanager
-    def move(self) -> Iterator[None]:
-        """Runs the motion of `begin_motion`: other requests, also those of its callback, are refused meanwhile."""
-        self._motion_thread = threading.get_ident()
+    def move(self, stop: Callable[[], object] | None = None) -> Iterator[None]:
+        """Runs the motion of `begin_motion`: other requests, also those of its callback, are refused meanwhile.
+
+        Args:
+            stop: Stops a motion that the controller plans, whose end is awaited; None for one that is streamed.
+        """
+        self._motion_thread, self._stop_planned = threading.get_ident(), stop
         try:
             yield
         finally:
-            self._motion_thread = None
+            self._motion_thread = self._stop_planned = None
             if self.is_closing:
                 self._disconnect()
 
@@ -108,12 +113,17 @@ class SessionLock:
         """
         if self._can_stop:
             self._reason = self._reason or reason
+        if (stop := self._stop_planned) is not None:
+            stop()
 
     def close(self) -> None:
         """Ends the connection once it is free; called from a callback, when the motion has ended."""
         self.is_closing = True
         if self._motion_thread == threading.get_ident():
             return
+        if (stop := self._stop_planned) is not None:
+            with suppress(RcilabError):
+                stop()
         is_acquired = self._busy.acquire(timeout=_CLOSE_TIMEOUT)
         try:
             self._disconnect()

@@ -117,6 +117,10 @@ class RequestLock(Protocol):
         """Acquires the connection, or yields False while a motion is running."""
         ...
 
+    def move(self, stop: Callable[[], object]) -> AbstractContextManager[None]:
+        """Surrounds the wait for a motion that the controller plans, inside `acquire`; `stop` stops it."""
+        ...
+
     def close(self) -> None:
         """Ends the connection."""
         ...

@@ -73,3 +73,18 @@ def test_another_thread_that_closes_waits_for_the_motion() -> None:
         assert said == ["disconnected"]
     closer.join(5.0)
     assert not closer.is_alive()
+
+
+def test_a_motion_that_the_controller_plans_is_stopped_by_stop_and_by_close() -> None:
+    stops: list[str] = []
+    turns = SessionLock(lambda: None)
+    with turns.acquire("a planned motion"), turns.move(lambda: stops.append("stop")):
+        assert turns.is_moving
+        turns.stop("on request")
+        closer = threading.Thread(target=turns.close)
+        closer.start()
+        wait_for(lambda: len(stops) == 2)
+        with pytest.raises(UsageError), turns.acquire("another"):
+            pass
+    closer.join(5.0)
+    assert not closer.is_alive()

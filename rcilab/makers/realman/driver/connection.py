@@ -11,7 +11,7 @@ from rcilab.core.state import RobotMode, RobotState
 from rcilab.makers.library_connection import LibraryConnection
 from rcilab.makers.realman.driver.client import RealManClient
 from rcilab.makers.realman.driver.push_receiver import NumberedPush, PushReceiver
-from rcilab.makers.realman.driver.state_reader import StateReader, is_enabled
+from rcilab.makers.realman.driver.state_reader import PAUSED, StateReader, is_enabled
 from rcilab.makers.realman.wire.units import pose_from_client
 
 _SILENCE = 300_000_000  # [ns] Without a state, after which the controller is asked where it pushes them.
@@ -27,6 +27,7 @@ class RealManConnection(LibraryConnection[NumberedPush]):
     Attributes:
         client: The client library.
         is_enabled: Whether all joints are enabled.
+        is_paused: Whether a motion that the controller plans is paused.
 
     Args:
         client: As the attribute.
@@ -37,7 +38,7 @@ class RealManConnection(LibraryConnection[NumberedPush]):
     def __init__(self, client: RealManClient, receiver: PushReceiver, n: int) -> None:
         super().__init__(client.name, n, receiver)
         self.client = client
-        self.is_enabled = False
+        self.is_enabled = self.is_paused = False
         self._receiver = receiver
         self._reader = StateReader(n)
         client.push_states(receiver.port)
@@ -81,4 +82,5 @@ class RealManConnection(LibraryConnection[NumberedPush]):
 
     def _read(self, report: NumberedPush) -> RobotState:
         self.is_enabled = is_enabled(report.pushed)
+        self.is_paused = report.pushed.arm_current_status == PAUSED
         return self._reader.read(report, is_streaming=self.is_streaming)

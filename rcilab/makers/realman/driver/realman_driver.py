@@ -191,11 +191,12 @@ class RealManDriver(LibraryDriver[NumberedPush]):
 
         Raises:
             InvalidValueError: It is not a mode for motions.
-            CommandRejectedError: The arm is not ready; the message has the reason.
+            CommandRejectedError: The arm is not ready, or a motion is paused; the message has the reason.
         """
         if mode is not ControllerMode.JOINT_POSITION:
             raise InvalidValueError("mode", mode, "is not a mode to move in; there is JOINT_POSITION")
         self._settings.await_states()
+        self._settings.require_not_paused("the motion")
         link, latest = self._link, self._link.latest
         assert latest is not None  # A connection begins with a state.
         if latest.faults and REFUSED_COMMANDS.issuperset(latest.faults):  # Of a command before this motion.

@@ -103,3 +103,8 @@ class RealManSessionCommands(RealManSettings):
     def _request(self, name: str) -> Iterator[None]:
         with self._lock.acquire(name):
             yield
+
+    @contextmanager
+    def _motion(self) -> Iterator[None]:
+        with self._lock.move(self.stop):
+            yield

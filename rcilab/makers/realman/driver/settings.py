@@ -376,6 +376,23 @@ class RealManSettings:
         for _ in range(_FRESH):
             self._link.on_states(self._link.poll(_STATE_TIMEOUT))
 
+    def require_not_paused(self, name: str) -> None:
+        """Requires that the controller holds no paused motion, by the newest state.
+
+        Args:
+            name: Name of the request in errors.
+
+        Raises:
+            CommandRejectedError: It does.
+        """
+        if self._link.is_paused:
+            raise CommandRejectedError(
+                name,
+                "a motion of this controller is paused",
+                "robot.realman.resume() continues it, robot.realman.stop() ends it",
+                reason="motion_paused",
+            )
+
     def _set_tool_frame(self, tool: Pose, load: Payload) -> None:
         api, client = self.api, self._client
         with self._request("set_tool_frame"):
@@ -451,15 +468,22 @@ class RealManSettings:
         """Commands a motion, as the last argument whether its end is awaited; Ctrl-C stops it.
 
         Raises:
+            CommandRejectedError: The controller refuses, or holds a paused motion, behind which it would wait.
             ControlError: It ended before its goal.
         """
+        self.await_states()
+        self.require_not_paused(call.__name__)
         if not wait:
             self._call(call, *values, 0)
             return
-        self.await_states()
+        self._is_stopped = False
+        with self._motion():
+            self._move_to_end(call, *values)
+
+    def _move_to_end(self, call: Callable[..., int], *values: Any) -> None:
         start = self._link.latest
         assert start is not None  # A connection begins with a state.
-        self._is_moving, self._is_stopped = True, False
+        self._is_moving = True
         try:
             self._call(call, *values, _BLOCK)
         except CommandRejectedError:
@@ -487,6 +511,11 @@ class RealManSettings:
     @contextmanager
     def _request(self, name: str) -> Iterator[None]:
         """Surrounds every request but those from any thread."""
+        yield
+
+    @contextmanager
+    def _motion(self) -> Iterator[None]:
+        """Surrounds the wait for a motion of the controller."""
         yield
 
 

@@ -21,7 +21,7 @@ from rcilab.makers.realman.errors import RealManError, errors_of_codes
 from rcilab.makers.realman.wire.pushed_state import JointStatus, PushedState, Waypoint
 from rcilab.makers.realman.wire.units import SPEED_STEP, pose_from_wire_quaternion
 
-IDLE, STOPPED = "idle", "stop"
+IDLE, PAUSED, STOPPED = "idle", "pause", "stop"
 """What an arm does, as reported."""
 _MILLIDEGREE = radians(1e-3)
 _SPEED = radians(SPEED_STEP)

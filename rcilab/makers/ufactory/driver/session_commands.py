@@ -83,3 +83,8 @@ class XArmSessionCommands(XArmSettings):
     def _request(self, name: str) -> Iterator[None]:
         with self._lock.acquire(name):
             yield
+
+    @contextmanager
+    def _motion(self) -> Iterator[None]:
+        with self._lock.move(self.stop):
+            yield

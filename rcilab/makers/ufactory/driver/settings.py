@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import JointVector, described
-from rcilab.core.errors import ControlError, InvalidValueError, RcilabError, UsageError
+from rcilab.core.errors import CommandRejectedError, ControlError, InvalidValueError, RcilabError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.makers.driver import require_signal
@@ -33,7 +33,7 @@ from rcilab.makers.ufactory.bounds import (
 )
 from rcilab.makers.ufactory.driver.client import describe_error, faults_of
 from rcilab.makers.ufactory.driver.connection import XArmConnection
-from rcilab.makers.ufactory.driver.state_reader import CHANGED, MOVING, READY, STOPPED
+from rcilab.makers.ufactory.driver.state_reader import CHANGED, MOVING, PAUSED, READY, STOPPED
 from rcilab.makers.ufactory.wire.poses import MILLIMETRE, pose_as_mm_rpy, pose_from_mm_rpy
 from rcilab.model.dynamics.payload import Payload
 from rcilab.motion.path import build_arc
@@ -297,6 +297,23 @@ class XArmSettings:
             with suppress(RcilabError):
                 self._set_state(_STOP)
 
+    def require_not_paused(self, name: str) -> None:
+        """Requires that the controller holds no paused motions.
+
+        Args:
+            name: Name of the request in errors.
+
+        Raises:
+            CommandRejectedError: It does.
+        """
+        if self._call("get_state") == PAUSED:
+            raise CommandRejectedError(
+                name,
+                "a motion of this controller is paused",
+                "robot.xarm.resume() continues it, robot.xarm.stop() ends it",
+                reason="motion_paused",
+            )
+
     def _set_state(self, state: int) -> None:
         self._client.request("set_state", self.api.set_state, state)
 
@@ -319,6 +336,7 @@ class XArmSettings:
 
     def _move(self, name: str, wait: bool, **arguments: Any) -> None:
         with self._request(name):
+            self.require_not_paused(name)
             self._link.ask(self._client.command, name, getattr(self.api, name), wait=False, **arguments)
             if wait:
                 self._await_end()
@@ -329,14 +347,15 @@ class XArmSettings:
             link.on_states(earlier)
         self._is_moving, self._is_stopped = True, False
         try:
-            while quiet < _QUIET:
-                states = link.poll(1.0)
-                link.on_states(states)
-                shown = link.shown
-                if self._is_stopped or (shown.state == STOPPED and self._is_still_stopped()):
-                    raise self._stopped_error()
-                is_quiet = shown.state in (0, READY, CHANGED) and not shown.queued
-                quiet = quiet + len(states) if is_quiet else 0
+            with self._motion():
+                while quiet < _QUIET:
+                    states = link.poll(1.0)
+                    link.on_states(states)
+                    shown = link.shown
+                    if self._is_stopped or (shown.state == STOPPED and self._is_still_stopped()):
+                        raise self._stopped_error()
+                    is_quiet = shown.state in (0, READY, CHANGED) and not shown.queued
+                    quiet = quiet + len(states) if is_quiet else 0
         except KeyboardInterrupt:
             self.stop()
             raise
@@ -359,6 +378,11 @@ class XArmSettings:
     @contextmanager
     def _request(self, name: str) -> Iterator[None]:
         """Surrounds every request but those from any thread."""
+        yield
+
+    @contextmanager
+    def _motion(self) -> Iterator[None]:
+        """Surrounds the wait for a motion of the controller."""
         yield
 
 

@@ -180,10 +180,11 @@ class XArmDriver(LibraryDriver[bytes]):
 
         Raises:
             InvalidValueError: It is not a mode for motions.
-            CommandRejectedError: The arm is not ready; the message has the reason.
+            CommandRejectedError: The arm is not ready, or a motion is paused; the message has the reason.
         """
         if mode is not ControllerMode.JOINT_POSITION:
             raise InvalidValueError("mode", mode, "is not a mode to move in; there is JOINT_POSITION")
+        self._settings.require_not_paused("the motion")
         self._link.ask(self._link.client.enter, SERVO_MODE)
         self._link.client.hurry(True)
         self._link.is_streaming = True

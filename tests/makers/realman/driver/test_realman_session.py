@@ -19,6 +19,7 @@ from rcilab.core.errors import (
     ModelError,
     PlanningError,
     RcilabError,
+    UsageError,
 )
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotMode
@@ -29,6 +30,7 @@ from rcilab.makers.realman.parameters import parameter_groups
 from rcilab.motion import plan_joint
 from rcilab.recording.run import load_run
 from tests.makers.realman.driver.conftest import HOME
+from tests.waiting import wait_for
 
 OFF = np.array([0.3, 0.2, -0.2, 0.3, 0.2, 0.4])
 ROUNDING = 1.001 * radians(0.0005)  # [rad] Half a unit of the wire.
@@ -168,6 +170,48 @@ def test_a_planned_motion_can_be_stopped_from_another_thread(robot):
     timer.join()
     assert np.abs(robot.state.q - HOME).max() < 0.4
     robot.realman.move_j(HOME)
+
+
+def test_a_planned_motion_is_watched_paused_and_stopped_from_another_thread(robot):
+    errors, start = [], robot.state.q
+
+    def move():
+        try:
+            robot.realman.move_j(HOME + 0.5, 0.3)
+        except RcilabError as error:
+            errors.append(error)
+
+    mover = threading.Thread(target=move)
+    mover.start()
+    try:
+        wait_for(lambda: robot.is_moving and np.abs(robot.state.q - start).max() > 0.02)
+        robot.realman.pause()
+        wait_for(lambda: not robot.state.dq.any())
+        with pytest.raises(UsageError, match="while a motion is running"):
+            robot.realman.move_j(HOME)
+        assert np.abs(robot.state.q - HOME).max() < 0.4
+    finally:
+        robot.stop()
+        mover.join(10.0)
+    assert not mover.is_alive()
+    assert [type(error) for error in errors] == [ControlError]
+
+
+def test_motions_are_refused_while_the_controller_holds_a_paused_one(robot):
+    robot.realman.move_j(HOME + 0.3, 0.3, wait=False)
+    wait_for(lambda: np.abs(robot.state.q - HOME).max() > 0.01)
+    robot.realman.pause()
+    wait_for(lambda: not robot.state.dq.any())
+    try:
+        with pytest.raises(CommandRejectedError, match=r"is paused; robot\.realman\.resume\(\)"):
+            robot.realman.move_j(HOME)
+        stays = plan_joint(robot.model, robot.state.q_c, HOME, speed=0.4)
+        with pytest.raises(CommandRejectedError, match="is paused"):
+            robot.execute(stays)
+    finally:
+        robot.realman.stop()
+    robot.realman.move_j(HOME)
+    assert np.abs(robot.state.q - HOME).max() < 1e-4
 
 
 def test_tool_and_load_are_a_frame_of_the_controller(robot):

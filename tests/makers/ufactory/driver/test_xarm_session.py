@@ -18,6 +18,7 @@ from rcilab.core.errors import (
     ModelError,
     PlanningError,
     RcilabError,
+    UsageError,
 )
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
@@ -33,6 +34,7 @@ from rcilab.makers.ufactory.parameters import parameter_groups
 from rcilab.motion import plan_joint
 from rcilab.recording.run import load_run
 from tests.makers.ufactory.driver.conftest import HOME
+from tests.waiting import wait_for
 
 FAR = np.array([0.0, 0.6, 0.0, 1.8, 0.0, 1.2, 0.0])  # From the axis of joint 1.
 OFF = np.array([0.3, 0.2, -0.2, 0.3, 0.2, 0.1, 0.4])
@@ -212,6 +214,48 @@ def test_a_planned_motion_can_be_stopped_from_another_thread(robot):
     timer.join()
     assert np.abs(robot.state.q_c - HOME).max() < 0.4
     robot.xarm.move_j(HOME)
+
+
+def test_a_planned_motion_is_watched_paused_and_stopped_from_another_thread(robot):
+    errors, start = [], robot.state.q
+
+    def move():
+        try:
+            robot.xarm.move_j(HOME + 0.5, 0.3)
+        except RcilabError as error:
+            errors.append(error)
+
+    mover = threading.Thread(target=move)
+    mover.start()
+    try:
+        wait_for(lambda: robot.is_moving and np.abs(robot.state.q - start).max() > 0.02)
+        robot.xarm.pause()
+        wait_for(lambda: not robot.state.dq.any())
+        with pytest.raises(UsageError, match="while a motion is running"):
+            robot.xarm.move_j(HOME)
+        assert np.abs(robot.state.q - HOME).max() < 0.4
+    finally:
+        robot.stop()
+        mover.join(10.0)
+    assert not mover.is_alive()
+    assert [type(error) for error in errors] == [ControlError]
+
+
+def test_motions_are_refused_while_the_controller_holds_a_paused_one(robot):
+    robot.xarm.move_j(HOME + 0.3, 0.3, wait=False)
+    wait_for(lambda: np.abs(robot.state.q - HOME).max() > 0.01)
+    robot.xarm.pause()
+    wait_for(lambda: not robot.state.dq.any())
+    try:
+        with pytest.raises(CommandRejectedError, match=r"is paused; robot\.xarm\.resume\(\)"):
+            robot.xarm.move_j(HOME)
+        stays = plan_joint(robot.model, robot.state.q_c, HOME, speed=0.4)
+        with pytest.raises(CommandRejectedError, match="is paused"):
+            robot.execute(stays)
+    finally:
+        robot.xarm.stop()
+    robot.xarm.move_j(HOME)
+    assert np.abs(robot.state.q - HOME).max() < 1e-4
 
 
 def test_tool_and_load_are_sent_and_another_session_reads_them(robot):
