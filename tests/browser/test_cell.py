@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 
 from browser.page import BenchPage
@@ -41,6 +39,6 @@ def test_an_obstacle_is_added_dragged_into_the_way_typed_out_of_it_and_deleted(p
     page.wait(lambda: page.state.cell.selected is not None, "the chosen entry")
     page.button("Delete").click()
     page.wait(lambda: page.state.cell.cell.obstacles == (), "the sphere to be gone")
-    assert re.search("Nothing stands", tab.locator(".rl-steps-none").first.inner_text())
+    tab.locator(".rl-steps-none", has_text="Nothing stands").wait_for(state="visible")
     page.bench.dispatcher.ask(EditCell(what="clear"))
     page.wait(lambda: page.state.cell.cell is None, "the end")
