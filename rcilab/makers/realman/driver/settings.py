@@ -63,6 +63,7 @@ _FRESH = 3  # States after which one shows the effect of a request: the first ma
 _STATE_TIMEOUT = 1.0  # [s]
 _ENABLED = 3.0  # [s]
 _SAME = 1e-6  # Share of a limit: more than the rounding of single precision.
+_ROUNDED = 1e-4  # Share of a speed: more than the rounding of one that was set, to 0.001 RPM.
 _LARGEST_ACCELERATION = speed_from_millirpm(LARGEST_JOINT_ACCELERATION)
 _BLOCK, _LAST, _NO_BLEND = 1, 0, 0
 """Arguments of motions: wait for the end, no further motion is connected, no rounded corner."""
@@ -483,7 +484,7 @@ class RealManSettings:
     def _move_to_end(self, call: Callable[..., int], *values: Any) -> None:
         start = self._link.latest
         assert start is not None  # A connection begins with a state.
-        self._is_moving = True
+        self._is_moving, ended_early = True, False
         try:
             self._call(call, *values, _BLOCK)
         except CommandRejectedError:
@@ -492,6 +493,7 @@ class RealManSettings:
             has_moved = latest is not None and float(np.abs(latest.q - start.q).max()) > _MOVED
             if not (has_moved or self._is_stopped):
                 raise
+            ended_early = True
         except KeyboardInterrupt:
             self.stop()
             raise
@@ -499,7 +501,7 @@ class RealManSettings:
             self._is_moving = False
         self.await_states()
         latest = self._link.latest
-        if self._is_stopped or (latest is not None and latest.faults):
+        if ended_early or self._is_stopped or (latest is not None and latest.faults):
             raise self._stopped_error(() if latest is None else latest.faults)
 
     def _stopped_error(self, faults: tuple[FaultCode, ...]) -> ControlError:
@@ -527,7 +529,7 @@ def _snapped(values: ArrayLike, own: ArrayLike) -> tuple[float, ...]:
 
 def _percent(speed: float, fastest: float, unit: str) -> int:
     """Returns a speed in whole percent of the fastest one, rounded down."""
-    value = float(bounded_vector("speed", [speed], ("",), unit, 0.01 * fastest, fastest * (1.0 + _SAME))[0])
+    value = float(bounded_vector("speed", [speed], ("",), unit, 0.01 * fastest, fastest * (1.0 + _ROUNDED))[0])
     return max(1, min(100, math.floor(100.0 * value / fastest * (1.0 + _SAME))))
 
 

@@ -197,6 +197,14 @@ def test_a_planned_motion_is_watched_paused_and_stopped_from_another_thread(robo
     assert [type(error) for error in errors] == [ControlError]
 
 
+def test_a_planned_motion_that_ends_by_power_off_is_an_error(robot):
+    timer = threading.Timer(0.3, robot.power_off)
+    timer.start()
+    with pytest.raises(ControlError, match="the motion was stopped before its end"):
+        robot.realman.move_j(HOME + 0.5, 0.2)
+    timer.join()
+
+
 def test_motions_are_refused_while_the_controller_holds_a_paused_one(robot):
     robot.realman.move_j(HOME + 0.3, 0.3, wait=False)
     wait_for(lambda: np.abs(robot.state.q - HOME).max() > 0.01)
@@ -242,7 +250,7 @@ def test_ranges_of_joints_are_set_while_they_are_disabled_and_plans_keep_them(ro
 def test_speeds_and_accelerations_in_force_are_those_of_the_model_and_its_checks(robot):
     arm = robot.model
     fast = plan_joint(arm, robot.state.q_c, HOME + 0.5, speed=0.4)
-    slower = 0.05 * arm.limits.joint.velocity
+    slower = np.full(6, 0.15)
     control = ControllerParameters(
         joint_velocity=tuple(slower),
         joint_acceleration=(5.0,) * 6,
@@ -255,6 +263,7 @@ def test_speeds_and_accelerations_in_force_are_those_of_the_model_and_its_checks
     np.testing.assert_allclose(joint.acceleration, 5.0, rtol=1e-3)
     assert (tool.translation_velocity, tool.rotation_acceleration) == pytest.approx((0.2, 3.0))
     assert robot.realman.api.rm_get_collision_stage() == (0, 3)
+    robot.realman.move_j(HOME, 0.15)  # As it was given: the interface has rounded it.
     with pytest.raises(RcilabError, match="velocity"):
         robot.execute(fast)
     with pytest.raises(InvalidValueError, match="whole number from 0 to 8"):
