@@ -63,7 +63,7 @@ _FRESH = 3  # States after which one shows the effect of a request: the first ma
 _STATE_TIMEOUT = 1.0  # [s]
 _ENABLED = 3.0  # [s]
 _SAME = 1e-6  # Share of a limit: more than the rounding of single precision.
-_ROUNDED = 1e-4  # Share of a speed: more than the rounding of one that was set, to 0.001 RPM.
+_ROUNDED = 1e-3  # Share of a speed: more than the rounding of one that was set, to 0.001 RPM.
 _LARGEST_ACCELERATION = speed_from_millirpm(LARGEST_JOINT_ACCELERATION)
 _BLOCK, _LAST, _NO_BLEND = 1, 0, 0
 """Arguments of motions: wait for the end, no further motion is connected, no rounded corner."""
