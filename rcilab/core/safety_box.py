@@ -13,6 +13,8 @@ from rcilab.core.arrays import Array, as_vector, described
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose, as_pose
 
+_STRAIGHT = 1e-6  # [rad] Rounding of a turn that is zero.
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SafetyBox:
@@ -165,6 +167,23 @@ def require_box(box: object) -> SafetyBox:
     if isinstance(box, SafetyBox):
         return box
     raise InvalidValueError("box", described(box), "must be a SafetyBox; use SafetyBox(size=..., T_base_box=...)")
+
+
+def require_straight(box: SafetyBox) -> SafetyBox:
+    """Returns `box` if it has the axes of the base, as the boundary of some controllers.
+
+    Raises:
+        InvalidValueError: It is turned.
+    """
+    turns = box.T_base_box.rpy
+    if float(np.abs(turns).max()) <= _STRAIGHT:
+        return box
+    roll, pitch, yaw = np.degrees(turns).round(3).tolist()
+    raise InvalidValueError(
+        "roll, pitch, yaw of the safety box",
+        [roll, pitch, yaw],
+        "must be 0 deg: the boundary of this controller has the axes of the base; leave the turn out",
+    ).coded("box_turned", turns=tuple(float(turn) for turn in turns))
 
 
 def active_box(box: object) -> SafetyBox | None:

@@ -189,12 +189,12 @@ def send_groups(control: object, requests: Mapping[str, Callable[[tuple[float, .
             send(control[name])
 
 
-def as_whole(name: str, value: float, most: int) -> int:
-    """Returns a parameter that has whole numbers from 0 to `most`.
+def as_whole(name: str, value: float, most: int, least: int = 0) -> int:
+    """Returns a parameter that has whole numbers from `least` to `most`.
 
     Raises:
         InvalidValueError: It is not one.
     """
-    if value not in range(most + 1):
-        raise InvalidValueError(name, value, f"must be a whole number from 0 to {most}")
+    if value not in range(least, most + 1):
+        raise InvalidValueError(name, value, f"must be a whole number from {least} to {most}")
     return round(value)

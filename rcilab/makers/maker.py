@@ -21,6 +21,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import ConditionTable
 from rcilab.core.errors import ModelError
 from rcilab.core.fault import FaultCode
+from rcilab.core.safety_box import require_straight
 from rcilab.core.state import Mode
 from rcilab.makers.configuration import RobotConfiguration, SetupPart, require_setup
 from rcilab.model.robot_model import RobotModel
@@ -63,6 +64,8 @@ class Capabilities:
     """Whether an emergency stop is an error that stays until a recovery, also after its release."""
     setup: tuple[SetupPart, ...] = ()
     """The parts of its configuration: safety box, tool, load, force-control frame, soft joint limits, parameters."""
+    turns_box: bool = True
+    """Whether its safety box may be turned; otherwise it has the axes of the base."""
     options: tuple[ControllerOption, ...] = ()
     """Options of its virtual controller that not every one has."""
     longest_tool: float = 2.0
@@ -297,12 +300,14 @@ def require_parts(model: RobotModel, configuration: object) -> RobotConfiguratio
     """Returns a configuration if an arm has all its parts.
 
     Raises:
-        InvalidValueError: It is not a configuration.
+        InvalidValueError: It is not a configuration, or its safety box is turned and that of the arm cannot be.
         ModelError: The arm lacks a part of it.
     """
     setup = require_setup(configuration)
     for part in setup.parts:
         require_feature(model, part)
+    if setup.box is not None and not capabilities_of(model).turns_box:
+        require_straight(setup.box)
     return setup
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
@@ -12,15 +13,18 @@ import ipywidgets
 import pytest
 
 from rcilab.app.arm_features import explain_missing_feature, explain_missing_part
-from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal import POSE_FIELDS, goal_at
 from rcilab.app.request import TypeField
 from rcilab.app.run.run_actions import ChooseRobot, RunActions
 from rcilab.app.setup.configuration_state import pending_parts
-from rcilab.app.setup.setup_actions import PressSetup, SetSetup, SetupActions
+from rcilab.app.setup.setup_actions import MoveSetup, PressSetup, SetSetup, SetupActions
+from rcilab.app.setup.setup_fields import FACE_NAMES
+from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import Text
 from rcilab.control_process import SupervisorStatus
-from rcilab.core.errors import ModelError
+from rcilab.core.errors import InvalidValueError, ModelError
+from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Text as NotebookText
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.makers.maker import maker_of, require_parts
@@ -156,6 +160,29 @@ def test_a_part_that_is_lacking_cannot_be_edited_restored_or_sent(lacking, store
     assert pending_parts(store.state, READY) == ("tool",)
     with pytest.raises(ModelError, match="xMate3 has no soft joint limits"):
         require_parts(MODEL, RobotConfiguration(joints=SoftJointLimits(lower=(0.0,), upper=(1.0,))))
+
+
+def test_a_box_that_cannot_be_turned_has_no_angles_and_is_refused_with_a_turn(lacking, store) -> None:
+    lacking(turns_box=False)
+    numbers, actions = SetupNumbersPanel(Text("en"), print), SetupActions(store, SimpleNamespace(status=lambda: READY))
+    numbers.build(gui(), store.state)
+    assert set(numbers._fields["box"]) == set(FACE_NAMES)
+    assert set(numbers._fields["tool"]) == set(POSE_FIELDS)
+    before = store.state.setup.wanted
+    actions.type_field(TypeField(field="setup.box.yaw", text="30"))
+    assert store.state.setup.wanted is before
+    actions.set_setup(SetSetup(name="edited", value="box"))
+    actions.move(MoveSetup(part="box", position=(0.1, 0.0, 0.6), wxyz=(0.8, 0.0, 0.0, 0.6)))
+    box = store.state.setup.wanted.box
+    assert box is not None
+    assert box.T_base_box.is_close(Pose((0.1, 0.0, 0.6)), 1e-12)
+    turned = replace(box, T_base_box=Pose.from_rpy((0.1, 0.0, 0.6), (0.0, 0.0, math.radians(30.0))))
+    with pytest.raises(
+        InvalidValueError, match=r"must be 0 deg.*got \[0\.0, 0\.0, 30\.0\]; leave the turn out"
+    ) as refusal:
+        require_parts(MODEL, RobotConfiguration(box=turned))
+    for language, sentence in (("en", "(roll, pitch, yaw: 0, 0, 30°)"), ("zh", "请将这三个角度设为 0")):
+        assert sentence in Text(language).render(explain_error(refusal.value))
 
 
 def test_an_arm_that_is_only_planned_for_keeps_its_setup(store, only_planned) -> None:

@@ -160,6 +160,8 @@ class Signals:
     def _bounds(self, condition: Condition) -> Bounds:
         """Returns the bounds of a condition in each row, each of shape (N, k)."""
         joint, count = self._limits.joint, len(self._rows)
+        if condition.signal == "position" and not condition.is_measured:  # Without the rounding of a check.
+            return np.full((count, 1), -math.inf), np.zeros((count, 1))
         if condition.bounds_at is None or not condition.depends_on_angles(joint):
             lower, upper = condition.bounds(self._limits)
             return np.tile(lower, (count, 1)), np.tile(upper, (count, 1))

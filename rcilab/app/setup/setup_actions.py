@@ -34,6 +34,7 @@ from rcilab.app.setup.setup_fields import (
     box_between,
     exact_end,
     faces,
+    field_names,
     field_range,
     joint_limits_between,
     with_field,
@@ -154,9 +155,10 @@ class SetupActions:
         if part == "joints":
             self._type_joint_limit(request, name)
             return
-        if name not in FIELD_NAMES.get(part, ()):
+        capabilities = capabilities_of(state.model)
+        if part not in FIELD_NAMES or name not in field_names(part, turns_box=capabilities.turns_box):
             return
-        longest = capabilities_of(state.model).longest_tool
+        longest = capabilities.longest_tool
         bounds = field_range(part, name, state.model.description.rated_payload, longest)
         parsed = parse_number(request.text, bounds.low, bounds.high, bounds.unit)
         if parsed.value is None:
@@ -218,8 +220,11 @@ class SetupActions:
             return  # A drag that ends after its edit, or of another part.
         if math.hypot(*request.wxyz) < 1e-6:
             return
-        state, pose = self._store.state, Pose(request.position, request.wxyz)
-        changed = with_pose(state.setup, request.part, pose, capabilities_of(state.model).longest_tool)
+        state = self._store.state
+        capabilities = capabilities_of(state.model)
+        is_straight = request.part == "box" and not capabilities.turns_box
+        pose = Pose(request.position) if is_straight else Pose(request.position, request.wxyz)
+        changed = with_pose(state.setup, request.part, pose, capabilities.longest_tool)
         if isinstance(changed, Message):
             self._store.notify("warn", changed)
         else:

@@ -63,6 +63,16 @@ def field_range(part: str, name: str, rated_payload: float, longest_tool: float)
     return Range(-farthest, farthest, "mm")
 
 
+def field_names(part: str, *, turns_box: bool) -> tuple[str, ...]:
+    """Returns the fields of a part.
+
+    Args:
+        part: A key of `FIELD_NAMES`.
+        turns_box: See `Capabilities.turns_box`.
+    """
+    return FACE_NAMES if part == "box" and not turns_box else FIELD_NAMES[part]
+
+
 def read_field(setup: SetupState, part: str, name: str) -> float:
     """Returns the number of a field, in its unit."""
     wanted = setup.wanted

@@ -23,8 +23,8 @@ TOOL_ROTATION: Final = pi  # [rad/s] Protocol manual, 4: speeds of pure rotation
 
 DEFAULT_JOINT_JERK: Final = 200.0  # [rad/s^3] User manual, 6.4.3 (11459 deg/s^3), as the next.
 DEFAULT_TOOL_JERK: Final = 7.0  # [m/s^3]
-SENSITIVITIES: Final = (0, 5)
-"""Range of the sensitivities to collisions and to hand guiding."""
+COLLISION_SENSITIVITIES: Final = (0, 5)
+TEACH_SENSITIVITIES: Final = (1, 5)  # Client library, set_teach_sensitivity.
 SENSITIVITY_STEP: Final = 0.2
 """By which each step of the collision sensitivity lowers the thresholds, from the largest torques of the joints at 1 to
 a fifth at 5; rcilab's own values: the maker publishes no forces."""

@@ -49,6 +49,7 @@ class Ufactory:
         switches_power=True,
         stop_is_error=True,
         setup=("box", "tool", "load", "joints", "control"),
+        turns_box=False,
         options=("loop_back",),
         longest_tool=LONGEST_TOOL,
     )

@@ -6,12 +6,13 @@ from rcilab.core.state import MODES
 from rcilab.i18n.translator import message
 from rcilab.makers.parameters import Parameter, ParameterGroup
 from rcilab.makers.ufactory.bounds import (
+    COLLISION_SENSITIVITIES,
     DEFAULT_JOINT_JERK,
     DEFAULT_SENSITIVITY,
     DEFAULT_TOOL_JERK,
     JOINT_ACCELERATION,
     JOINT_JERK,
-    SENSITIVITIES,
+    TEACH_SENSITIVITIES,
     TOOL_ACCELERATION,
     TOOL_JERK,
 )
@@ -23,8 +24,8 @@ _SMALLEST = 0.1
 def parameter_groups() -> tuple[ParameterGroup, ...]:
     """Returns the parameters of an arm."""
     return (
-        _sensitivity("collision_sensitivity"),
-        _sensitivity("teach_sensitivity"),
+        _sensitivity("collision_sensitivity", COLLISION_SENSITIVITIES),
+        _sensitivity("teach_sensitivity", TEACH_SENSITIVITIES),
         ParameterGroup(
             name="motion_limits",
             parameters=(
@@ -38,8 +39,8 @@ def parameter_groups() -> tuple[ParameterGroup, ...]:
     )
 
 
-def _sensitivity(name: str) -> ParameterGroup:
-    low, high = SENSITIVITIES
+def _sensitivity(name: str, levels: tuple[int, int]) -> ParameterGroup:
+    low, high = levels
     level = Parameter(
         label=message("control.level"), low=float(low), high=float(high), default=float(DEFAULT_SENSITIVITY), unit=""
     )

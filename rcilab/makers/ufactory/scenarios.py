@@ -19,7 +19,7 @@ from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
 from rcilab.makers.scenario import Callback, FaultScenario, Scene
 from rcilab.makers.scenario_streams import PAUSE, last_joint_narrowed, over_the_end, planned, struck, turned
-from rcilab.makers.ufactory.bounds import SENSITIVITIES, SENSITIVITY_STEP, SERVO_SPEED_FACTOR
+from rcilab.makers.ufactory.bounds import COLLISION_SENSITIVITIES, SENSITIVITY_STEP, SERVO_SPEED_FACTOR
 from rcilab.makers.ufactory.errors import UfactoryError
 
 _EDGE = 0.3  # [m] Of the boundary around the tool.
@@ -66,7 +66,7 @@ def _too_fast(scene: Scene) -> Callback:
 
 
 def _sensitive(scene: Scene) -> Scene:
-    most = SENSITIVITIES[1]
+    most = COLLISION_SENSITIVITIES[1]
     scene.commands.set_collision_sensitivity(most)
     share = 1.0 - SENSITIVITY_STEP * (most - 1)
     return scene.guarded(readonly_copy(share * scene.robot.model.limits.joint.torque))

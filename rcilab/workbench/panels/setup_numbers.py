@@ -8,9 +8,10 @@ from rcilab.app.arm_features import explain_missing_part
 from rcilab.app.goal.goal import POSE_FIELDS
 from rcilab.app.setup.configuration_state import FORCE_AXES
 from rcilab.app.setup.setup_actions import SetSetup
-from rcilab.app.setup.setup_fields import FIELD_NAMES, INERTIA_NAMES, read_field
+from rcilab.app.setup.setup_fields import FIELD_NAMES, INERTIA_NAMES, field_names, read_field
 from rcilab.app.text import Text
 from rcilab.makers.configuration import SETUP_PARTS
+from rcilab.makers.maker import capabilities_of
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, shown
 
@@ -41,7 +42,7 @@ class SetupNumbersPanel:
         """Adds the controls."""
         text, ask = self._text, self._ask
         self._folders: dict[str, Any] = {}
-        self._fields: dict[str, list[NumberField]] = {}
+        self._fields: dict[str, dict[str, NumberField]] = {}
         self._problems: dict[str, Html] = {}
         self._named: dict[str, list[tuple[str, str]]] = {}  # Each field, and its name in problems.
         self._seen: dict[str, BoundControl] = {}
@@ -58,7 +59,7 @@ class SetupNumbersPanel:
                     self._active = BoundControl(active, ask, _switch("active"))
                 if part == "force":
                     self._build_axes(gui, ask)
-                self._build_numbers(gui, part)
+                self._build_numbers(gui, part, field_names(part, turns_box=capabilities_of(state.model).turns_box))
                 see = gui.add_checkbox(text("setup.see"), False, hint=text("setup.see_hint"))
                 self._seen[part] = BoundControl(see, ask, _switch(part))
                 gui.add_html(f'<p class="rl-note">{esc(text(f"setup.note.{part}"))}</p>')
@@ -79,23 +80,25 @@ class SetupNumbersPanel:
             self._axes.show(next(self._labels[name] for name, kind in FORCE_AXES.items() if kind == force.type))
         for part in self._folders:
             self._seen[part].show(part in setup.seen)
-            for field, name in zip(self._fields[part], FIELD_NAMES[part], strict=True):
+            for name, field in self._fields[part].items():
                 number = read_field(setup, part, name)
                 sentence = f"{number + 0.0:.6g}" if part == "load" and name in INERTIA_NAMES else shown(number)
                 field.show(sentence, state.problems.get(field.field), state.entered)
             self._problems[part].show(problems_html(state, self._text, self._named[part]))
 
-    def _build_numbers(self, gui: Any, part: str) -> None:
+    def _build_numbers(self, gui: Any, part: str, known: tuple[str, ...]) -> None:
         text = self._text
-        self._fields[part] = []
+        self._fields[part] = {}
         self._named[part] = []
         for row, names in _ROWS[part]:
+            if not set(names) <= set(known):
+                continue
             gui.add_html(f'<p class="rl-rowname">{esc(text(f"setup.row.{row}"))}</p>')
             for name in names:
                 box = gui.add_text(self._label(name), "", hint=text("target.type_hint"))
                 unit = None if name == "mass" or name in INERTIA_NAMES else "deg" if name in POSE_FIELDS[3:] else "mm"
                 field = f"setup.{part}.{name}"
-                self._fields[part].append(NumberField(box, self._ask, field, text.unit(unit) if unit else None))
+                self._fields[part][name] = NumberField(box, self._ask, field, text.unit(unit) if unit else None)
                 self._named[part].append((field, f"{text(f'setup.row.{row}')}: {self._label(name)}"))
         self._problems[part] = Html(gui)
 

@@ -14,6 +14,7 @@ from rcilab.app.text import Text
 from rcilab.core.arrays import Array
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
+from rcilab.makers.maker import capabilities_of
 from rcilab.robots.mesh import revolve
 from rcilab.views.arm_view import ArmView
 from rcilab.views.configuration_view import BOX_COLOR, ConfigurationView, outside_runs
@@ -109,9 +110,10 @@ class ConfigurationSceneView:
         if not part:
             return
         pose = _pose_of(state, part)
+        is_straight = part == "load" or (part == "box" and not capabilities_of(state.model).turns_box)
         name = "/setup_box" if part == "box" else f"{self._flange}/handles_{part}"
         self._gizmo = self._server.scene.add_transform_controls(
-            name, scale=_SCALES[part], line_width=3.0, depth_test=False, disable_rotations=part == "load",
+            name, scale=_SCALES[part], line_width=3.0, depth_test=False, disable_rotations=is_straight,
             wxyz=pose.wxyz, position=pose.position,
         )  # fmt: skip
 

@@ -25,6 +25,7 @@ def test_errors_come_with_their_reason_and_the_arm_moves_again():
             assert demo.reported == (fault,)
             assert demo.condition.fault is fault
             assert demo.signal.is_broken
+            assert demo.bound == 0.0 or fault is not UfactoryError.SAFETY_BOUNDARY
             assert demo.describe("sent", "en") != demo.describe("sent", "zh")
             assert demo.way_out[-2:] == ("recover", "move")
             assert all(

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.solvers.offset7.arm import build_offset_geometry, trace, wrapped
 from rcilab.model.kinematics.solvers.offset7.inverse import DEGREE, polynomial, solve_held
 from rcilab.model.kinematics.solvers.offset7.singularity import held_singularity, held_singularity_path
@@ -41,6 +42,15 @@ def test_every_solution_has_the_pose_and_the_elbow_and_each_is_there_once(case):
     for shift in range(1, 2 * DEGREE):
         same = rows[shift:] == rows[:-shift]
         assert (np.abs(wrapped(found[shift:] - found[:-shift])).max(axis=1)[same] > 1e-6).all()
+
+
+def test_solutions_that_share_their_first_joint_are_there_once():
+    model = load_model("xArm7")
+    for turn in ((0.0, -1.0, 0.0, 0.0), (0.0, 0.9, 0.1, 0.0), (0.0, 1.0, 0.0, 0.0)):
+        found = np.array([branch.q for branch in model.inverse(Pose((0.4, 0.15, 0.35), turn), psi=0.0).all])
+        apart = np.abs(wrapped(found[:, np.newaxis] - found)).max(axis=2)
+        assert len(found) == 8
+        assert apart[~np.eye(len(found), dtype=bool)].min() > 1e-3
 
 
 def test_the_arms_own_configuration_is_among_them_unless_two_meet_there(case):

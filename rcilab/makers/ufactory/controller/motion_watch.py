@@ -20,6 +20,7 @@ _OVERLOAD_CYCLES = 100  # That a drive may be at its largest torque; a tuning va
 _DETECTION_CYCLES = 300  # After the start of mode 2, before a hand reaches the arm; a tuning value.
 _DETECTION_SPEED = 0.2  # [rad/s] Which an arm with half a kilogram more than its load exceeds in this time.
 _SPEED_MARGIN = 1.001  # Rounding of the planner's differences.
+_ROUNDING = 0.01  # [mm] By which targets of single precision, at most 2.4e-7 rad off, may move a tool outwards.
 
 
 class Finding(NamedTuple):
@@ -39,7 +40,7 @@ class MotionWatch:
     def __init__(self, arm: VirtualArm) -> None:
         self._arm = arm
         self._links = SelfCollisionWatch(arm.model)
-        self._last_excess = 0.0
+        self._farthest = 0.0  # [mm] That the tool may be outside the boundary.
         self._overload = 0
 
     def configure(self) -> None:
@@ -49,7 +50,7 @@ class MotionWatch:
     def begin(self, settings: Settings) -> None:
         """Begins with a motion."""
         self._links.begin(self._arm.signals.measured.q)
-        self._last_excess = self._excess(settings)
+        self._farthest = self._excess(settings) + _ROUNDING
         self._overload = 0
 
     def step(self, settings: Settings, *, is_servo: bool) -> Finding | None:
@@ -77,10 +78,10 @@ class MotionWatch:
         )
 
     def _find_outside(self, settings: Settings) -> Finding | None:
-        """Finds a tool that moves farther out of the boundary."""
-        excess, before = self._excess(settings), self._last_excess
-        self._last_excess = excess
-        if excess <= before:
+        """Finds a tool that leaves the boundary, or moves farther out than it has been in this motion."""
+        excess = self._excess(settings)
+        if excess <= self._farthest:
+            self._farthest = min(self._farthest, excess + _ROUNDING)
             return None
         text = f"the tool is {excess:.2g} mm outside the safety boundary"
         remark = Remark(text, "outside_boundary", away=MILLIMETRE * excess)

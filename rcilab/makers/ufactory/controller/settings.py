@@ -13,6 +13,7 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.makers.ufactory.bounds import (
+    COLLISION_SENSITIVITIES,
     DEFAULT_JOINT_JERK,
     DEFAULT_SENSITIVITY,
     DEFAULT_TOOL_JERK,
@@ -21,9 +22,9 @@ from rcilab.makers.ufactory.bounds import (
     JOINT_JERK,
     JOINT_VELOCITY,
     LONGEST_TOOL,
-    SENSITIVITIES,
     SENSITIVITY_STEP,
     SERVO_SPEED_FACTOR,
+    TEACH_SENSITIVITIES,
     TOOL_ACCELERATION,
     TOOL_JERK,
 )
@@ -61,7 +62,7 @@ class Settings(ArmParameters):
     collision_sensitivity: int = DEFAULT_SENSITIVITY
     """0: no collision is detected; 5: the smallest."""
     teach_sensitivity: int = DEFAULT_SENSITIVITY
-    """0: the hand moves the arm against the largest damping; 5: the smallest."""
+    """1: the hand moves the arm against the largest damping; 5: the smallest."""
     servo_speed_factor: float = SERVO_SPEED_FACTOR
     """By which joint targets of mode 1 may exceed the tool's largest speed."""
     joint_jerk: float = DEFAULT_JOINT_JERK
@@ -174,10 +175,10 @@ def apply_setting(settings: Settings, function: Function, values: tuple[Any, ...
             mass, *centre = values
             return replace(settings, load=Payload(mass=mass, center_of_mass=MILLIMETRE * np.array(centre)))
         case Function.SET_COLLISION_SENSITIVITY:
-            value = _within("collision sensitivity", values[0], *SENSITIVITIES)
+            value = _within("collision sensitivity", values[0], *COLLISION_SENSITIVITIES)
             return _with_thresholds(replace(settings, collision_sensitivity=value))
         case Function.SET_TEACH_SENSITIVITY:
-            level = _within("teach sensitivity", values[0], *SENSITIVITIES)
+            level = _within("teach sensitivity", values[0], *TEACH_SENSITIVITIES)
             damping = _DAMPING_STEP ** (DEFAULT_SENSITIVITY - level)
             return replace(settings, teach_sensitivity=level, guide_damping=damping)
         case Function.SET_GRAVITY_DIRECTION:

@@ -159,7 +159,7 @@ class XArmController:
         self._set_state = State.STOPPED
         self._shown_state = State.STOPPED
         self._is_outdated = False  # Settings have changed that the arm has not yet.
-        self._was_following = False
+        self._was_moving = False
         self._is_guided = False
         self._number = 0
         self._tokens = float(_SERVO_BURST)
@@ -508,12 +508,9 @@ class XArmController:
 
     def _watch(self) -> None:
         """Checks the cycle of a motion."""
+        was_moving, self._was_moving = self._was_moving, False
         if not self._feed.is_feeding:
-            self._was_following = False
             return
-        if not self._was_following:
-            self._was_following = True
-            self._motion_watch.begin(self.settings)
         obstruction = self.planner.obstruction
         if obstruction is not None:
             self.refuse(obstruction)
@@ -521,6 +518,9 @@ class XArmController:
         if self.planner.state is not PlannerState.MOVING:
             self._end_online(EventKind.REACHED)
             return
+        self._was_moving = True
+        if not was_moving:
+            self._motion_watch.begin(self.settings)
         found = self._motion_watch.step(self.settings, is_servo=self.mode is Mode.SERVO)
         if found is not None:
             self.fail(*found)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, as_whole, send_groups
-from rcilab.makers.ufactory.bounds import SENSITIVITIES
+from rcilab.makers.ufactory.bounds import COLLISION_SENSITIVITIES, TEACH_SENSITIVITIES
 
 if TYPE_CHECKING:
     from rcilab.makers.ufactory.driver.settings import XArmSettings
@@ -24,8 +24,10 @@ def send_parameters(settings: XArmSettings, control: ControllerParameters) -> No
         CommandRejectedError: The controller refused; the error names the request.
     """
     requests: dict[str, Callable[[tuple[float, ...]], None]] = {
-        "collision_sensitivity": lambda values: settings.set_collision_sensitivity(_level(values[0])),
-        "teach_sensitivity": lambda values: settings.set_teach_sensitivity(_level(values[0])),
+        "collision_sensitivity": lambda values: settings.set_collision_sensitivity(
+            _level(values[0], COLLISION_SENSITIVITIES)
+        ),
+        "teach_sensitivity": lambda values: settings.set_teach_sensitivity(_level(values[0], TEACH_SENSITIVITIES)),
         "motion_limits": lambda values: settings.set_motion_limits(*values),
     }
     send_groups(control, requests)
@@ -53,5 +55,6 @@ def send_configuration(settings: XArmSettings, setup: RobotConfiguration) -> Non
         send_parameters(settings, setup.control)
 
 
-def _level(value: float) -> int:
-    return as_whole("sensitivity", value, SENSITIVITIES[1])
+def _level(value: float, levels: tuple[int, int]) -> int:
+    least, most = levels
+    return as_whole("sensitivity", value, most, least)

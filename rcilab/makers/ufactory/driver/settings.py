@@ -16,18 +16,19 @@ from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import JointVector, described
 from rcilab.core.errors import CommandRejectedError, ControlError, InvalidValueError, RcilabError, UsageError
-from rcilab.core.safety_box import SafetyBox
+from rcilab.core.safety_box import SafetyBox, require_straight
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.makers.driver import require_signal
 from rcilab.makers.setting_values import bounded_vector
 from rcilab.makers.ufactory.bounds import (
+    COLLISION_SENSITIVITIES,
     INPUTS,
     JOINT_ACCELERATION,
     JOINT_JERK,
     JOINT_VELOCITY,
     LONGEST_TOOL,
     OUTPUTS,
-    SENSITIVITIES,
+    TEACH_SENSITIVITIES,
     TOOL_ACCELERATION,
     TOOL_JERK,
 )
@@ -43,6 +44,7 @@ _AXES = ("x", "y", "z")
 _FASTEST_TOOL = 1.0  # [m/s] The client library lowers a higher speed to it.
 _HEAVIEST_LOAD = 20.0  # [kg] rcilab's own bound, for kilograms given as grams.
 _QUIET = 5  # Reports without a motion until it has ended: the first ones may be older than its command.
+_STANDS = 1.0  # [s] For a stopped arm to stand.
 _BOUNDARY = (-32768, 32767)  # [mm] Numbers of 16 bits.
 _ROUNDING = 1e-6  # [mm] Rounding of lengths that are whole millimetres.
 _SAME_ANGLE = 1e-6  # [rad]
@@ -126,8 +128,7 @@ class XArmSettings:
         Raises:
             InvalidValueError: The box is turned: the boundary has the axes of the base.
         """
-        if not np.allclose(box.T_base_box.rotation, np.eye(3), atol=1e-6):
-            raise InvalidValueError("box", box, "is turned; the boundary has the axes of the base: leave the turn out")
+        require_straight(box)
         middle, half = np.array(box.T_base_box.position), 0.5 * np.array(box.size)
         largest = np.floor((middle + half) / MILLIMETRE + _ROUNDING).clip(*_BOUNDARY)
         least = np.ceil((middle - half) / MILLIMETRE - _ROUNDING).clip(*_BOUNDARY)
@@ -174,11 +175,11 @@ class XArmSettings:
 
     def set_collision_sensitivity(self, value: int) -> None:
         """Sets the sensitivity to collisions, from 0 (off) to 5."""
-        self._set("set_collision_sensitivity", _sensitivity(value), wait=False)
+        self._set("set_collision_sensitivity", _sensitivity(value, COLLISION_SENSITIVITIES), wait=False)
 
     def set_teach_sensitivity(self, value: int) -> None:
-        """Sets the sensitivity to hand guiding, from 0 to 5."""
-        self._set("set_teach_sensitivity", _sensitivity(value), wait=False)
+        """Sets the sensitivity to hand guiding, from 1 to 5."""
+        self._set("set_teach_sensitivity", _sensitivity(value, TEACH_SENSITIVITIES), wait=False)
 
     def set_output(self, signal: int, level: bool) -> None:
         """Sets a digital output of the control box: 0 to 7 are CO0 to CO7, 8 to 15 DO0 to DO7."""
@@ -353,6 +354,7 @@ class XArmSettings:
                     link.on_states(states)
                     shown = link.shown
                     if self._is_stopped or (shown.state == STOPPED and self._is_still_stopped()):
+                        link.wait(lambda: link.is_still, _STANDS)
                         raise self._stopped_error()
                     is_quiet = shown.state in (0, READY, CHANGED) and not shown.queued
                     quiet = quiet + len(states) if is_quiet else 0
@@ -401,8 +403,8 @@ def _radius(radius: float | None) -> float | None:
     return float(bounded_vector("radius", [radius], ("",), "m", 0.0, LONGEST_TOOL)[0]) / MILLIMETRE
 
 
-def _sensitivity(value: object) -> int:
-    least, largest = SENSITIVITIES
+def _sensitivity(value: object, levels: tuple[int, int]) -> int:
+    least, largest = levels
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= largest:
         raise InvalidValueError("value", value, f"is no sensitivity; there are {least} to {largest}")
     return value

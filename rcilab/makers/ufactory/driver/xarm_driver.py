@@ -112,7 +112,7 @@ class XArmDriver(LibraryDriver[bytes]):
         return self._link.client.is_enabled
 
     def recover(self) -> None:
-        """Clears error and warning, switches the motors on, and returns once the arm is ready in mode 0.
+        """Clears error and warning, switches the motors on, and returns once the arm stands, ready in mode 0.
 
         Raises:
             DeadlineError: The error remains.
@@ -127,7 +127,7 @@ class XArmDriver(LibraryDriver[bytes]):
                 "not_cleared", faults=f"C{link.error}", seconds="0"
             )
         self.power(True)
-        link.wait(lambda: link.shown.state < STOPPED, _RECOVERED)
+        link.wait(lambda: link.shown.state < STOPPED and link.is_still, _RECOVERED)  # It may still brake.
 
     def configure(self, configuration: RobotConfiguration) -> None:
         """Sends a configuration."""

@@ -185,6 +185,32 @@ def test_inside_the_boundary_the_arm_moves_and_outside_only_inwards(arm: Arm) ->
     assert arm.pose[1] < outside - 25.0
 
 
+def test_a_target_rounded_outwards_does_not_stop_an_arm_outside_its_boundary(arm: Arm) -> None:
+    leave_the_boundary(arm)
+    arm.run()
+    arm.ready(Mode.SERVO)
+    first, *others = arm.q
+    for off, error in ((0.0, 0), (5e-7, 0), (-1e-4, 0), (5e-7 - 1e-4, 0), (1e-4, 35)):  # 1e-4 rad are 0.04 mm.
+        for _ in range(3):
+            arm.call(Function.SERVO_JOINT, "10f", first + off, *others, *NOTHING)
+            arm.step(4)
+        assert arm.error[0] == error, off
+
+
+def test_a_boundary_acts_from_the_motion_after_its_setting(arm: Arm) -> None:
+    x, y, z, *rpy = arm.pose
+    arm.move_line((x, y + 5.0, z, *rpy))
+    arm.run()
+    arm.call(Function.SET_BOUNDARY, "6i", int(x) + 50, int(x) - 50, int(y), int(y) - 50, int(z) + 50, int(z) - 50)
+    arm.call(Function.SET_FENCE, "B", 1)
+    arm.move_line((x, y - 5.0, z, *rpy))
+    arm.run()
+    assert arm.error == (0, 0)
+    arm.move_line((x, y + 5.0, z, *rpy))
+    arm.run()
+    assert arm.error[0] == 35
+
+
 def blocked(sensitivity: int) -> Arm:
     """Returns an arm in MuJoCo that moves against a push that it cannot overcome."""
     arm = Arm(plant="mujoco")

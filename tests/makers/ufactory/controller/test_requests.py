@@ -214,7 +214,7 @@ def test_the_factor_on_the_tool_speed_of_mode_1_is_set_read_and_acts(arm: Arm) -
 
 def test_the_teach_sensitivity_changes_how_far_the_hand_moves_the_arm() -> None:
     moved: list[float] = []
-    for level in (0, 3, 5):
+    for level in (1, 3, 5):
         arm = Arm(plant="mujoco")
         arm.controller.set_up(ArmSetup(q=Q6))
         arm.call(Function.SET_TEACH_SENSITIVITY, "B", level)

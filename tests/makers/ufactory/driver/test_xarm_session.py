@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -210,10 +211,10 @@ def test_a_planned_motion_can_be_stopped_from_another_thread(robot):
     timer = threading.Timer(0.2, robot.xarm.stop)
     timer.start()
     with pytest.raises(ControlError, match="the motion was stopped before its end"):
-        robot.xarm.move_j(HOME + 0.5, 0.2)
+        robot.xarm.move_j(HOME + 0.5, 0.4)
     timer.join()
     assert np.abs(robot.state.q_c - HOME).max() < 0.4
-    robot.xarm.move_j(HOME)
+    assert robot.move_j(HOME, speed=0.4).faults == ()
 
 
 def test_a_planned_motion_is_watched_paused_and_stopped_from_another_thread(robot):
@@ -315,10 +316,27 @@ def test_the_safety_box_is_the_boundary_of_the_tool_in_whole_millimetres(robot):
     with pytest.raises(RcilabError, match="box"):
         robot.execute(motion)
     turned = SafetyBox(size=(1.0, 1.0, 1.0), T_base_box=Pose.from_rpy((0.0, 0.0, 0.5), (0.0, 0.0, 0.1)))
-    with pytest.raises(InvalidValueError, match="is turned"):
-        robot.xarm.set_boundary(turned)
+    for send in (robot.xarm.set_boundary, robot.set_safety_box):
+        with pytest.raises(InvalidValueError, match=r"must be 0 deg.*got \[0\.0, 0\.0, 5\.73\]"):
+            send(turned)
     robot.xarm.set_boundary(SafetyBox(size=(3.0, 3.0, 3.0), T_base_box=Pose(), active=False))
     assert robot.execute(motion).faults == ()
+
+
+def test_an_arm_that_left_its_boundary_moves_back_right_after_recover(robot):
+    start = robot.model.forward(HOME)
+    middle = tuple(start.position.round(3).tolist())
+    robot.set_safety_box(SafetyBox(size=(2.0, 0.3, 2.0), T_base_box=Pose(middle)))
+    try:
+        for waits in (True, False):
+            with pytest.raises(ControlError) if waits else nullcontext():
+                robot.xarm.move_l(Pose(start.position + (0.0, 0.25, 0.0), start.wxyz), 0.3, wait=waits)
+            wait_for(lambda: robot.state.faults == (UfactoryError.SAFETY_BOUNDARY,))
+            robot.recover()
+            assert robot.safety_box.excess(robot.state.T_base_tool_c.position) > 0.0
+            assert robot.move_j(HOME, speed=0.4).faults == ()
+    finally:
+        robot.set_safety_box(SafetyBox(size=(3.0, 3.0, 3.0), T_base_box=Pose(), active=False))
 
 
 def test_soft_limits_are_the_ranges_of_reduced_mode(robot):
@@ -343,8 +361,9 @@ def test_parameters_are_sensitivities_and_limits_of_planned_motions(robot):
     api = robot.xarm.api
     assert (api.collision_sensitivity, api.teach_sensitivity) == (1, 4)
     assert (api.joint_jerk, api.tcp_jerk) == pytest.approx((100.0, 5000.0))
-    with pytest.raises(InvalidValueError, match="whole number from 0 to 5"):
-        robot.configure(RobotConfiguration(control=ControllerParameters(teach_sensitivity=(2.5,))))
+    for level in (2.5, 0.0):  # The client library has no level 0.
+        with pytest.raises(InvalidValueError, match="whole number from 1 to 5"):
+            robot.configure(RobotConfiguration(control=ControllerParameters(teach_sensitivity=(level,))))
     with pytest.raises(InvalidValueError, match="known: collision_sensitivity"):
         robot.configure(RobotConfiguration(control=ControllerParameters(filters=(1.0,))))
     defaults = default_parameters(parameter_groups())

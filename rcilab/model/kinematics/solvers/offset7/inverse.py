@@ -216,9 +216,11 @@ def _joint_angles(
 
 
 def _are_new(rows: NDArray[np.intp], q: Array) -> NDArray[np.bool_]:
-    """Returns which solutions differ from the two before; sorted by pose and joint angles."""
+    """Returns which solutions differ from all before them of their pose; `rows` is not decreasing."""
     is_new = np.ones(len(rows), dtype=np.bool_)
-    for shift in (1, 2):
-        same = rows[shift:] == rows[:-shift]
-        is_new[shift:] &= ~(same & (np.abs(wrapped(q[shift:] - q[:-shift])).max(axis=1) < _SAME))
+    for shift in range(1, int(np.bincount(rows).max(initial=0))):
+        is_near = (rows[shift:] == rows[:-shift]) & (np.abs(wrapped(q[shift:, 0] - q[:-shift, 0])) < _SAME)
+        near = np.flatnonzero(is_near)  # Few: only these are compared in all joints.
+        is_same = np.abs(wrapped(q[near + shift] - q[near])).max(axis=1) < _SAME
+        is_new[near[is_same] + shift] = False
     return is_new
