@@ -81,6 +81,9 @@ class AppState:
     problems: Mapping[str, Message] = field(default_factory=lambda: MappingProxyType({}))
     """Problems of typed numbers, by field."""
 
+    session_cell: Cell | None = None
+    """The cell of the session that executes."""
+
     @property
     def is_virtual(self) -> bool:
         """Whether the robot is a virtual controller: no hardware moves."""
@@ -98,4 +101,4 @@ class AppState:
 
     def cell_for(self, model: RobotModel) -> Cell | None:
         """Returns the cell that plans for an arm are checked in, with its tool and load; None without one."""
-        return None
+        return self.session_cell

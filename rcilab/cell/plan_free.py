@@ -120,9 +120,13 @@ def _room(query: DistanceQuery, required: ClearanceLimit, start: JointVector, go
 def _require_free(query: DistanceQuery, required: ClearanceLimit, q: JointVector, name: str) -> None:
     excess, pair = _excess(query, required, q)
     if excess <= 0.0:
+        remedy = f"choose another {name}, or move the obstacle"
+        if not any((required.links, required.floor, required.cell)):
+            raise PlanningError(f"the {name} is not free: {pair} overlap by {-1e3 * excess:.3g} mm; {remedy}").coded(
+                "not_free_overlap", end=name, pair=pair, distance=-excess
+            )
         raise PlanningError(
-            f"the {name} is not free: {pair} are {-1e3 * excess:.3g} mm nearer than required; choose another {name}, "
-            "or move the obstacle"
+            f"the {name} is not free: {pair} are {-1e3 * excess:.3g} mm nearer than required; {remedy}"
         ).coded("not_free", end=name, pair=pair, distance=-excess)
 
 

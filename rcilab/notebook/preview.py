@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rcilab.cell.cell import Cell, require_cell
 from rcilab.core.arrays import Array, as_vector
 from rcilab.core.atomic_file import replacing
 from rcilab.core.closeable import Closeable
@@ -23,6 +24,7 @@ from rcilab.motion.motion import Motion
 from rcilab.notebook.kernel_reachability import find_reachability
 from rcilab.robots.upright import upright_joints
 from rcilab.views.arm_view import ArmView
+from rcilab.views.cell_view import CellView, carried_mesh
 
 if TYPE_CHECKING:
     from rcilab.motion.motion import Motion
@@ -47,6 +49,7 @@ class Preview(Closeable):
         live: Whether the kernel serves it.
         height: Height in the notebook, [px].
         language: "en" or "zh"; defaults to that of the notebook.
+        cell: What the arm carries and what stands around it; None: neither.
 
     Raises:
         InvalidValueError: The pose is not n finite numbers, the motion is for another number of joints, or the language
@@ -62,6 +65,7 @@ class Preview(Closeable):
         live: bool = True,
         height: int = HEIGHT,
         language: str | None = None,
+        cell: Cell | None = None,
     ) -> None:
         self._text = Text(chosen_language(language), "rcilab.notebook")
         require_installed("meshcat", "preview")
@@ -80,6 +84,10 @@ class Preview(Closeable):
         self._arm = ArmView(self._scene, "arm", model, quality="fine" if live else "coarse")
         self._arm.show(pose)
         self._moving = False
+        if cell is not None:
+            require_cell(cell).require_arm(model)
+            CellView(self._scene).show(cell)
+            self._arm.show_carried(carried_mesh(cell, model.T_flange_tool))
         if motion is not None:
             ArmView(self._scene, "goal", model, "plan").show(motion.goal)
             self._animate(motion)
@@ -173,6 +181,7 @@ def preview(
     live: bool | None = None,
     height: int = HEIGHT,
     language: str | None = None,
+    cell: Cell | None = None,
 ) -> Preview:
     """Returns a 3D scene that plays a motion, or shows joint angles, inside the notebook.
 
@@ -183,13 +192,14 @@ def preview(
             kernel, see `rcilab.notebook.kernel_reachability`.
         height: Height in the notebook, [px].
         language: "en" or "zh"; defaults to that of the notebook.
+        cell: What the arm carries and what stands around it; None: neither.
 
     Raises:
-        InvalidValueError: The pose is not n finite numbers.
+        InvalidValueError: The pose is not n finite numbers, or the cell is that of another arm.
     """
     if live is None:
         live = find_reachability().route != "static"
-    return Preview(motion, model, live=live, height=height, language=language)
+    return Preview(motion, model, live=live, height=height, language=language, cell=cell)
 
 
 def aim_camera(visualizer: Any) -> None:

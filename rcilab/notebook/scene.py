@@ -9,15 +9,18 @@ from typing import Any, Literal
 import numpy as np
 
 from rcilab.app.planning import Plan
+from rcilab.cell.cell import Cell
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.optional_deps import require_installed
+from rcilab.core.spatial import Pose
 from rcilab.notebook.kernel_reachability import KernelReachability, find_reachability
 from rcilab.notebook.part import Part
 from rcilab.notebook.preview import Preview, aim_camera
 from rcilab.notebook.style import block, soft, write
 from rcilab.notebook.viser_link import LOOPBACK, open_page
 from rcilab.views.arm_view import ArmView
+from rcilab.views.cell_view import CellView, carried_mesh
 from rcilab.views.scene import Color
 from rcilab.views.scene import Scene as Canvas
 from rcilab.views.usage_colors import usage_colors
@@ -109,9 +112,11 @@ class Scene(Part):
         self._write_frame(f'srcdoc="{html.escape(self._make_animation().html())}"')
 
     def _make_animation(self) -> Preview:
-        plan = self.state.shown_scene_plan
-        what = self.state.now.goal.q if plan is None else plan.motion
-        return Preview(what, self.model, live=False, height=self.height, language=self.text.language)
+        plan, now = self.state.shown_scene_plan, self.state.now
+        what = now.goal.q if plan is None else plan.motion
+        return Preview(
+            what, self.model, live=False, height=self.height, language=self.text.language, cell=now.session_cell
+        )
 
 
 class _LivePicture:
@@ -130,10 +135,14 @@ class _LivePicture:
         self._shown = {"goal": True, "plan": True}
         self._ghost_color = _REACHED
         self._path: Plan | None = None
+        self._cell = CellView(canvas)
+        self._drawn: tuple[Cell | None, Pose | None] = (None, None)
+        self._draw_cell()
 
     def draw(self) -> None:
-        """Moves the three arms to their current positions."""
+        """Moves the three arms to their current positions, and draws the cell."""
         state, status = self._state, self._state.status
+        self._draw_cell()
         seen = state.shown_scene_plan
         moment = None if state.moment is None or seen is None else seen.motion.at(state.moment).q
         robot = None if status is None else status.q
@@ -146,6 +155,18 @@ class _LivePicture:
         if tint != self._ghost_color:
             self._ghost_color = tint
             self._goal.set_look(color=tint)
+
+    def _draw_cell(self) -> None:
+        """Draws the cell of the session: its obstacles, and what the arm carries."""
+        now = self._state.now
+        cell, tool = now.session_cell, now.model.T_flange_tool
+        if cell is self._drawn[0] and tool is self._drawn[1]:
+            return
+        self._drawn = (cell, tool)
+        self._cell.show(cell)
+        carried = carried_mesh(cell, tool)
+        for arm in (self._arm, self._goal, self._ghost):
+            arm.show_carried(carried)
 
     def draw_path(self) -> None:
         """Draws the path of the tool, coloured by the utilisation of the joints' limits."""

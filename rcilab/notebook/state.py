@@ -100,9 +100,10 @@ class LabState:
 
     @property
     def now(self) -> AppState:
-        """The current values; with a session, tool, load and soft limits are its current ones."""
-        if self.session is not None and self.session.model is not self.store.state.model:
-            self.store.update(model=self.session.model)
+        """The current values; with a session, tool, load, soft limits and cell are its current ones."""
+        session, state = self.session, self.store.state
+        if session is not None and (session.model is not state.model or session.cell is not state.session_cell):
+            self.store.update(model=session.model, session_cell=session.cell)
         return self.store.state
 
     @property
@@ -200,21 +201,23 @@ class LabState:
         The function takes long: do not call it in a thread that others wait for.
         """
         with self.lock:
-            make, mode = self.goals.prepare_plan(self.here), self.now.drive.mode
+            now = self.now
+            make, mode, cell = self.goals.prepare_plan(self.here), now.drive.mode, now.cell_for(now.model)
 
         def run(progress: ProgressCallback) -> Plan | Message:
             made = make(progress)
             progress(_PLANNED)
-            return made.completed(mode) if isinstance(made, Plan) else made
+            return made.completed(mode, cell) if isinstance(made, Plan) else made
 
         return run
 
     def take_motion(self, motion: Motion) -> None:
         """Takes a motion that was planned elsewhere; it is checked like any other."""
         require_motion(motion)
-        mode = self.now.drive.mode
-        report = check(motion, self.model, mode=mode)
-        self.show(replace(build_plan_view(self.model, motion, report), mode=mode, complete=True))
+        now = self.now
+        mode, cell = now.drive.mode, now.cell_for(now.model)
+        report = check(motion, now.model, cell=cell, mode=mode)
+        self.show(replace(build_plan_view(now.model, motion, report), cell=cell, mode=mode, complete=True))
 
     def follow(self, mode: Mode) -> None:
         """Chooses the command mode; the plan is checked by the conditions of that mode.

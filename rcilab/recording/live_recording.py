@@ -12,6 +12,7 @@ from rcilab.recording.run import Run, build_run, find_delay
 from rcilab.recording.run_setup import Setup
 
 if TYPE_CHECKING:
+    from rcilab.cell.cell import Cell
     from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion
     from rcilab.recording.run_file import RunFile
@@ -29,6 +30,8 @@ class RunFacts:
     plan: Motion | None
     model: RobotModel
     setup: Setup
+    cell: Cell | None = None
+    """The cell that the motion was checked in; None without one."""
 
 
 class LiveRecording:
@@ -106,6 +109,7 @@ class LiveRecording:
             stopped=stopped,
             model=facts.model,
             setup=facts.setup,
+            cell=facts.cell,
             has_speed_override=plan is not None,
         )
 

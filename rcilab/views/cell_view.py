@@ -1,6 +1,7 @@
 """A cell in a scene: its obstacles, and its frames.
 
-Node names: /cell/obstacle0, /cell/frame0 and so on. Tool and part are drawn on the flange of an arm, see `ArmView`.
+Node names: /cell/obstacle0 with /cell/obstacle0/mesh, /cell/frame0 and so on. Tool and part are drawn on the flange of
+an arm, see `ArmView`.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class CellView:
         self._scene = scene
         self._root = "/cell"
         self._obstacles: list[tuple[Obstacle, Pose, Color]] = []
-        self._frames: list[tuple[str, Pose]] = []
+        self._frames: list[Pose] = []
         scene.add_frame(self._root)
 
     def show(self, cell: Cell | None, touched: str = "") -> None:
@@ -45,14 +46,14 @@ class CellView:
         obstacles = (
             [] if cell is None else [(o, cell.solid(o.name).pose, _color(cell, o, touched)) for o in cell.obstacles]
         )
-        frames = [] if cell is None else [(frame.name, cell.T_base(frame.name)) for frame in cell.frames]
+        frames = [] if cell is None else [cell.T_base(frame.name) for frame in cell.frames]
         with self._scene.batch():
             self._show_obstacles(obstacles)
             self._show_frames(frames)
 
     def obstacle_node(self, index: int) -> str:
         """Returns the name of the mesh of an obstacle."""
-        return f"{self._root}/obstacle{index}"
+        return f"{self._root}/obstacle{index}/mesh"
 
     def remove(self) -> None:
         """Removes the cell from the scene."""
@@ -60,33 +61,34 @@ class CellView:
 
     def _show_obstacles(self, wanted: list[tuple[Obstacle, Pose, Color]]) -> None:
         for index in range(len(wanted), len(self._obstacles)):
-            self._scene.remove(self.obstacle_node(index))
-        drawn = self._obstacles[: len(wanted)]
+            self._scene.remove(f"{self._root}/obstacle{index}")
         for index, (obstacle, pose, color) in enumerate(wanted):
+            before = self._obstacles[index] if index < len(self._obstacles) else None
+            self._place(f"{self._root}/obstacle{index}", None if before is None else before[1], pose)
             node = self.obstacle_node(index)
-            before = drawn[index] if index < len(drawn) else None
             if before is None or before[0].shape != obstacle.shape:
                 mesh = shape_mesh(obstacle.shape)
                 opacity = _WALL_OPACITY if isinstance(obstacle.shape, Plane) else 1.0
                 self._scene.add_mesh(node, mesh.vertices, mesh.faces, color=color, opacity=opacity)
-                before = None
             elif before[2] != color:
                 self._scene.set_style(node, color=color)
-            if before is None or not before[1].is_close(pose, 0.0):
-                self._scene.set_transform(node, wxyz=pose.wxyz.tolist(), position=pose.position.tolist())
         self._obstacles = wanted
 
-    def _show_frames(self, wanted: list[tuple[str, Pose]]) -> None:
+    def _show_frames(self, wanted: list[Pose]) -> None:
         for index in range(len(wanted), len(self._frames)):
             self._scene.remove(f"{self._root}/frame{index}")
-        for index, (_, pose) in enumerate(wanted):
-            node = f"{self._root}/frame{index}"
-            if index >= len(self._frames):
-                self._scene.add_frame(node, axes_length=_AXES)
-            elif self._frames[index][1].is_close(pose, 0.0):
-                continue
-            self._scene.set_transform(node, wxyz=pose.wxyz.tolist(), position=pose.position.tolist())
+        for index, pose in enumerate(wanted):
+            before = self._frames[index] if index < len(self._frames) else None
+            self._place(f"{self._root}/frame{index}", before, pose, _AXES)
         self._frames = wanted
+
+    def _place(self, node: str, before: Pose | None, pose: Pose, axes_length: float = 0.0) -> None:
+        """Moves a frame, or adds one that was not there before."""
+        wxyz, position = pose.wxyz.tolist(), pose.position.tolist()
+        if before is None:
+            self._scene.add_frame(node, wxyz=wxyz, position=position, axes_length=axes_length)
+        elif not before.is_close(pose, 0.0):
+            self._scene.set_transform(node, wxyz=wxyz, position=position)
 
 
 def carried_mesh(cell: Cell | None, T_flange_tool: Pose) -> Mesh | None:

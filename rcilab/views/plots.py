@@ -69,6 +69,21 @@ class Frame:
     """End of the time axis, [s]: a round number, so that the axis does not move while a plan is dragged."""
 
 
+def peak_of(frame: Frame) -> tuple[int, float, float] | None:
+    """Returns the curve with the largest value, from 0, this value, in the unit of the curves, and its time, [s].
+
+    Measured curves come before planned ones. None without a curve.
+    """
+    curves = frame.actual or frame.plan
+    if not curves:
+        return None
+    sizes = np.abs(np.stack(curves))
+    if np.isnan(sizes).all():
+        return None
+    curve, row = (int(index) for index in np.unravel_index(np.nanargmax(sizes), sizes.shape))
+    return curve, float(curves[curve][row]), float(frame.t[row])
+
+
 def mark_moment(frame: Frame, moment: float) -> Frame:
     """Returns a frame with an instant marked like a violation.
 

@@ -38,6 +38,7 @@ def decorate(index: bytes, quality: str = "full") -> bytes:
         "resend",
         "labels",
         "toolbar",
+        "jog_devices",
     )
     script = b"\n".join((assets / f"{name}.js").read_bytes() for name in scripts)
     head = b"<style>" + style + b"</style><script>" + script + b"</script></head>"

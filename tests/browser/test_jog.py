@@ -102,3 +102,49 @@ def test_a_held_button_moves_the_robot_until_it_is_let_go_in_any_way(jogging):
     page.tab.goto(f"{page.bench.url}?fixedDpr=0.2")
     page.wait_until_drawn()
     close_toasts(page.tab)
+
+
+_PAD = """(pressed) => {
+  const pad = { connected: true, mapping: "standard", axes: [0, pressed.stick, 0, 0],
+                buttons: [...Array(17).keys()].map((n) => ({ pressed: pressed.buttons.includes(n) })) };
+  navigator.getGamepads = () => pressed.gone ? [] : [pad];
+  window.dispatchEvent(new Event(pressed.gone ? "gamepaddisconnected" : "gamepadconnected"));
+}"""
+
+
+def test_keys_and_a_gamepad_jog_as_the_buttons_do_and_only_with_its_dead_man_button(jogging):
+    page, keyboard = jogging, jogging.tab.keyboard
+    start = np.array(page.status.q_c)
+    keyboard.down("2")
+    page.wait(lambda: moves(page), "joint 2 to move")
+    keyboard.up("2")
+    require_rest(page)
+    moved = page.status.q_c - start
+    assert moved[1] > 0.0
+    assert np.abs(np.delete(moved, 1)).max() < 1e-12
+    page.wait(lambda: page.status.phase == "idle", "an idle arm")
+
+    page.tab.evaluate(_PAD, {"stick": -1.0, "buttons": [], "gone": False})
+    require_rest(page)
+    assert np.array_equal(page.status.q_c, start + moved), "nothing moves without the dead-man button"
+    before = page.state.model.forward(page.status.q_c).position
+    page.tab.evaluate(_PAD, {"stick": -1.0, "buttons": [4], "gone": False})
+    page.wait(lambda: moves(page), "the tool to move")
+    page.tab.evaluate(_PAD, {"stick": -1.0, "buttons": [], "gone": False})
+    require_rest(page)
+    travel = page.state.model.forward(page.status.q_c).position - before
+    assert travel[0] > 1e-3
+    assert np.abs(travel[1:]).max() < 1e-4
+    page.wait(lambda: page.status.phase == "idle", "an idle arm")
+    page.tab.evaluate(_PAD, {"stick": 1.0, "buttons": [5], "gone": False})
+    page.wait(lambda: moves(page), "the tool to move back")
+    page.tab.evaluate(_PAD, {"stick": 1.0, "buttons": [5], "gone": True})
+    require_rest(page)
+
+
+def test_a_question_mark_lists_the_keys(page):
+    page.tab.evaluate("document.activeElement.blur()")  # A field of an earlier test.
+    page.tab.locator("body").press("?")
+    page.wait(lambda: "Dead-man button" in page.tab.locator("#rl-help").inner_text(), "the list of keys")
+    page.tab.locator("body").press("?")
+    page.wait(lambda: page.tab.locator("#rl-help").count() == 0, "no list")

@@ -56,7 +56,7 @@ def test_a_free_straight_line_is_the_joint_motion() -> None:
 
 def test_an_end_that_touches_is_named() -> None:
     at_goal = Obstacle(name="box", shape=Box(size=(0.1, 0.1, 0.1)), pose=MODEL.forward(GOAL))
-    with pytest.raises(PlanningError, match=r"the goal is not free: link 7 and box are .* mm nearer than required"):
+    with pytest.raises(PlanningError, match=r"the goal is not free: link 7 and box overlap by .* mm"):
         rcilab.plan_free(MODEL, START, GOAL, CELL.placed(at_goal))
 
 

@@ -18,6 +18,7 @@ from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import outdated
 from rcilab.app.goal.goal_actions import CancelSearch, MoveJoint, PlanGoal, PoseGoal, SetPathType, SetSpeed
 from rcilab.app.request import Request, TypeField
+from rcilab.app.run.replay import replayed
 from rcilab.app.run.run_actions import ChooseRobot, RobotCommand
 from rcilab.app.setup.setup_actions import OpenTab, PressSetup
 from rcilab.app.text import Text
@@ -97,6 +98,12 @@ def test_an_obstacle_in_the_way_is_refused_and_the_verdict_follows_it(bench, ask
     ask(RobotCommand(what="execute"))
     wait(lambda: abs(bench.session.status().q_c[0] - goal[0]) < 1e-3, "the arm at its goal")
     wait(lambda: bench.session.status().phase == "idle", "the end of the motion")
+    wait(lambda: bench.store.state.last_run is not None and bench.store.state.last_run.run is not None, "the run")
+    run = bench.store.state.last_run.run
+    assert [obstacle.name for obstacle in run.cell.obstacles] == ["Box"]
+    shown = replayed(bench.store.state, run)
+    assert shown.cell.cell is run.cell
+    assert outdated(shown) is None
     ask(PoseGoal(name="home"))
     wait(lambda: checked(bench, True), "a plan back")
     ask(RobotCommand(what="execute"))

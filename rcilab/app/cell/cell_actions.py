@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -52,7 +52,6 @@ FILE_FIELD = "cell.file"
 FLOOR_FIELD = "cell.floor"
 _TOO_FAR = 10.0  # [m] A mesh that reaches farther is in millimetres.
 _THOUSANDTH = 1e-3
-_HAND_GONE = 1.0  # [s] A drag without an event for this time has ended.
 _LONGEST_NAME = 60  # [characters]
 
 
@@ -136,7 +135,6 @@ class CellActions:
         self._histories: dict[str, _History] = {self._arm: _History()}
         self._preparation: BackgroundJob[Callable[[], None], None] = BackgroundJob("cell")
         self._drag: tuple[object, ...] | None = None
-        self._dragged = -math.inf  # Time of the last drag event, [s].
 
     @property
     def handlers(self) -> Handlers:
@@ -264,7 +262,7 @@ class CellActions:
             is_angle, is_place = name in POSE_FIELDS[3:], name in POSE_FIELDS[:3]
             high = 360.0 if is_angle else 1000.0 * FARTHEST
             low = -high if is_angle or is_place else 1.0
-            change: Callable[[float], Cell] = lambda value: with_field(cell, entry, name, value)  # noqa: E731
+            change = partial(with_field, cell, entry, name)
             self._type_number(request, low, high, "deg" if is_angle else "mm", change)
 
     def restore(self, cell: Cell) -> None:
@@ -397,10 +395,10 @@ class CellActions:
 
     def _change(self, cell: Cell | None, drag: tuple[object, ...] | None = None, has_ended: bool = False) -> None:
         """Replaces the cell; the steps of one drag are one step for undo."""
-        history, now = self._history, time.monotonic()
-        if drag is None or drag != self._drag or now - self._dragged > _HAND_GONE:
+        history = self._history
+        if drag is None or drag != self._drag:
             history.past = [*history.past[-UNDO_DEPTH:], history.cell]
-        self._drag, self._dragged = (None if has_ended else drag), now
+        self._drag = None if has_ended else drag
         history.cell, history.future = cell, []
         self._set(cell=cell)
         self._set_history(history)

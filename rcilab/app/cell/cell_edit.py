@@ -61,7 +61,7 @@ def obstacle_of(cell: Cell, entry: Entry) -> Obstacle:
 
 
 def added(cell: Cell, kind: NewKind, name: str) -> tuple[Cell, Entry]:
-    """Returns a cell with a new entry that stands on the floor beside the arm, and the entry.
+    """Returns a cell with a new entry beside the arm, at the height of its base, and the entry.
 
     Args:
         cell: The cell.
@@ -81,7 +81,7 @@ def added(cell: Cell, kind: NewKind, name: str) -> tuple[Cell, Entry]:
 
 
 def with_shape(cell: Cell, name: str, shape: Shape, T_base: Pose | None = None) -> tuple[Cell, Entry]:
-    """Returns a cell with a new obstacle, on the floor beside the arm or at a pose in the base frame, and its entry."""
+    """Returns a cell with a new obstacle, beside the arm or at a pose in the base frame, and its entry."""
     name = free_name(cell, name)
     pose = _beside(cell, -lowest(shape)) if T_base is None else cell.T_world_base @ T_base
     return cell.placed(Obstacle(name=name, shape=shape, pose=pose)), Entry("obstacle", name)
@@ -216,12 +216,9 @@ def free_name(cell: Cell, name: str) -> str:
 
 
 def _beside(cell: Cell, height: float) -> Pose:
-    """Returns a pose in the world beside the arm, upright, at a height above the floor; those of several differ."""
-    floor = cell.floor_height
+    """Returns a pose in the world beside the arm, upright, at a height above its base; those of several differ."""
     x, y = _BESIDE
-    return cell.T_world_base @ Pose(
-        (x, y - 0.1 * (len(cell.obstacles) % 8), (0.0 if floor is None else floor) + height)
-    )
+    return cell.T_world_base @ Pose((x, y - 0.1 * (len(cell.obstacles) % 8), height))
 
 
 def _parents_first(frames: list[Frame]) -> tuple[Frame, ...]:

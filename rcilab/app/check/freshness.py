@@ -26,7 +26,7 @@ def outdated(state: UiState) -> Message | None:
     if plan is None or (state.watched and plan.is_recorded):  # What a client commanded stays what it is.
         return None
     stale = plan.stale_parts(state.model, state.setup.wanted.box)
-    if not stale and plan.complete and plan.cell is not state.cell_for(plan.model):
+    if not stale and plan.complete and not plan.is_recorded and plan.cell is not state.cell_for(plan.model):
         stale = ("cell",)
     if plan.program is not None and program.planned is not program.draft:
         if program.planned is None and program.tone == "bad" and program.answer is not None:

@@ -61,7 +61,8 @@ def row_facts(row: ConditionResult, text: Text) -> list[str]:
         facts = [value_against_bound(value, bound, row.unit, text)]
     else:
         (number,) = text.units.format_numbers(row.unit, value)
-        facts = [text(f"check.zero.{row.necessity}", value=with_unit(number, row.unit, text))]
+        code = "check.above_zero" if row.condition.is_clearance else f"check.zero.{row.necessity}"
+        facts = [text(code, value=with_unit(number, row.unit, text))]
     if row.links is not None:
         facts.append(explain_place(row, text.language))
     elif row.joint:

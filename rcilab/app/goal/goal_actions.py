@@ -455,7 +455,7 @@ class GoalActions:
             state = self._store.state
         if state.plan is None or time.monotonic() - self._planned < (RESTED if self._is_held else SETTLED):
             return
-        cell = state.cell_for(state.plan.model)
+        cell = state.plan.cell if state.plan.is_recorded else state.cell_for(state.plan.model)
         if cell is not state.plan.cell and time.monotonic() < self._rested:
             return
         began = time.monotonic()

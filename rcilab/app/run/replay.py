@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rcilab.app.cell.cell_state import CellState
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.planning import build_plan_view
 from rcilab.app.run.run_recorder import whole_recording
@@ -51,9 +52,11 @@ def replayed(state: UiState, run: Run) -> UiState:
     wanted = state.setup.wanted.updated(RobotConfiguration(tool=model.T_flange_tool, load=model.load))
     setup = replace(state.setup, wanted=wanted, touched=frozenset({"tool", "load"}))
     recording = whole_recording(run)
-    return replace(
-        state, model=model, setup=setup, plan=plan, goal=goal, recording=recording, last_run=recording, playhead=0.0
-    )
+    shown = replace(
+        state, model=model, setup=setup, cell=CellState(cell=run.cell), goal=goal, recording=recording,
+        last_run=recording, playhead=0.0,
+    )  # fmt: skip
+    return replace(shown, plan=replace(plan, cell=shown.cell_for(model)))
 
 
 def replayed_pose(state: UiState) -> JointVector | None:

@@ -43,7 +43,7 @@ class RunRecorder:
         state = self._store.state
         plant = state.plant if state.target == "virtual" else ""
         setup = Setup(target=state.target, plant=plant, mode=state.drive.mode, started_ns=time.time_ns())
-        facts = RunFacts(plan=plan.motion, model=state.model, setup=setup)
+        facts = RunFacts(plan=plan.motion, model=state.model, setup=setup, cell=plan.cell)
         self._live = LiveRecording(facts, self._open(state, plan, setup))
 
     def add(self, rows: NDArray[np.void], scaled_motion: SpeedScaledMotion | None = None) -> None:
@@ -99,7 +99,13 @@ class RunRecorder:
         path = state.runs / f"{stamp}-{setup.started_ns // 1_000_000 % 1000:03d}-{state.model.name}{ENDING}"
         try:
             file = RunFile(
-                path, cycle_dtype(state.model.n), plan=plan.motion, model=state.model, setup=setup, report=plan.report
+                path,
+                cycle_dtype(state.model.n),
+                plan=plan.motion,
+                model=state.model,
+                setup=setup,
+                report=plan.report,
+                cell=plan.cell,
             )
         except InvalidValueError as error:
             self._complain(error)

@@ -356,10 +356,28 @@
     if (!button) return;
     event.preventDefault();
     if (event.repeat || held || button.disabled) return;
-    button.dispatchEvent(new PointerEvent("pointerdown", { bubbles: true, button: 0, buttons: 1, pointerId: 1 }));
-    held = { target: button, pointerId: 1, key: event.key };
-    button.classList.add("rl-holding");
+    holdBy(button, event.key);
   }, true);
+  const holdBy = (button, key) => {
+    button.dispatchEvent(new PointerEvent("pointerdown", { bubbles: true, button: 0, buttons: 1, pointerId: 1 }));
+    held = { target: button, pointerId: 1, key };
+    button.classList.add("rl-holding");
+    watchHeld();
+  };
+  // For keys and devices that jog: the button of a direction is held as by the mouse; releasing it is the click.
+  window.rcilabJog = {
+    hold: (button, key) => {
+      if (held || button.disabled || button.getClientRects().length === 0) return false;
+      holdBy(button, key);
+      return true;
+    },
+    release: (key) => {
+      if (!held || held.key !== key) return;
+      const button = held.target;
+      letGo();
+      button.click();
+    },
+  };
   window.addEventListener("keyup", (event) => {
     if (!isKey(event) || !holds(event.target)) return;
     event.preventDefault();

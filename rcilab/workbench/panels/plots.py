@@ -25,6 +25,7 @@ from rcilab.views.plots import (
     build_tool_frame,
     last_time,
     mark_moment,
+    peak_of,
     plan_curves,
     recorded_curves,
     streamed_curves,
@@ -168,7 +169,8 @@ class Plots:
         if state.recording is not None and state.recording.moment is not None:
             frame = mark_moment(frame, state.recording.moment - state.recording.delay * CYCLE_TIME)
         title = self._text(f"plot.{name}") + (f" · J{joint}" if joint else "") + f" [{unit}]"
-        self._titles[name].show(f'<div class="rl-plot-title">{esc(title)}</div>')
+        peak = self._peak_html(frame, name, joint, "%" if unit == self._text("plot.percent") else unit)
+        self._titles[name].show(f'<div class="rl-plot-title">{esc(title)}{peak}</div>')
         low = 0.0 if name in ("speed", "acceleration", "tool") else -frame.bound
         ends = float(frame.lower.min()), float(frame.upper.max())
         self._reaches[name] = low, frame.bound, tuple(end for end in ends if math.isfinite(end))
@@ -181,6 +183,16 @@ class Plots:
         scales = {"x": {"time": False, "range": (0.0, frame.end)}, "y": {"range": (low, frame.bound)}}
         if plot.scales != scales:
             plot.scales = scales
+
+    def _peak_html(self, frame: Frame, name: str, joint: int, unit: str) -> str:
+        """Returns the largest value of a plot and its time, in words."""
+        peak = peak_of(frame)
+        if peak is None:
+            return ""
+        curve, value, moment = peak
+        who = "" if joint or name in (*TOOL_QUANTITIES, "tool") else f"J{curve + 1} "
+        words = self._text("plot.peak", who=who, value=f"{value:.3g}", unit=unit, time=f"{moment:.2f}")
+        return f"<span>{esc(words)}</span>"
 
     def _joint_frame(self, state: UiState, name: Quantity, factor: float) -> Frame:
         plan, recording, actual = state.plan, state.recording, None

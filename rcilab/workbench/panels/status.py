@@ -31,6 +31,9 @@ _TONES = {
     "lost.rebooted": "warn",
 }
 
+_KEYS = ("stop", "home", "joint", "joint_back", "held", "pad", "sticks", "cross", "undo", "help")
+"""Keys and buttons of a gamepad, in the order of their list."""
+
 
 def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_end: float) -> dict[str, Any]:
     """Returns the contents of the page's bar, for `LiveChannel.publish`."""
@@ -45,6 +48,7 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
             {"name": extra, "label": text(f"extra.{extra}"), "on": extra in state.scene.extras}
             for extra in extras_of(state.model)
         ],
+        "keys": [[text(f"key.{key}"), text(f"key.{key}_does")] for key in _KEYS],
         "lost": text("bar.lost"),
         "quality": state.quality,
         "software": text("bar.software") if state.quality == "full" else "",
