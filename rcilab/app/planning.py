@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -56,7 +57,9 @@ class Plan:
     missed_by: Message | None = None
     """How far from the target it ends, as a message; None if it reaches the target."""
     program: Program | None = None
-    """The program of the motion; None if it leads to the goal."""
+    """The program of the motion, in base; None if it leads to the goal."""
+    frames: Mapping[str, Pose] = field(default_factory=dict[str, Pose])
+    """Pose in base of each frame that waypoints of the program are in."""
     mode: Mode = "joint_position"
     """The mode it was checked for."""
     kind: PathType = "joint"
@@ -124,6 +127,12 @@ class Plan:
         if then["limits"] != now["limits"]:
             changed.append("joints")
         return tuple(changed)
+
+
+def moved_frames(plan: Plan, cell: Cell | None) -> tuple[str, ...]:
+    """Returns the names of the frames of a plan's program that are elsewhere in the cell, or no longer in it."""
+    now = cell.frame_poses if cell is not None and plan.frames else {}
+    return tuple(name for name, pose in plan.frames.items() if name not in now or not pose.is_close(now[name]))
 
 
 def tool_path(model: RobotModel, motion: Motion) -> Array:

@@ -120,6 +120,14 @@ class Cell:
         """
         return self.T_world_base.inverse() @ self.T_world(frame)
 
+    @property
+    def frame_poses(self) -> dict[str, Pose]:
+        """Pose of each frame in the base frame of the arm by its name, and that of the world."""
+        poses = {WORLD: self.T_world_base.inverse()}
+        for frame in self.frames:
+            poses[frame.name] = poses[frame.parent] @ frame.T_parent_frame
+        return poses
+
     def solid(self, name: str) -> Solid:
         """Returns an obstacle as a solid in the base frame of the arm.
 

@@ -16,7 +16,7 @@ from rcilab.cli.arm_options import (
     parse_tool_and_load,
     read_cell,
 )
-from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
+from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file, resolved
 from rcilab.cli.output import show
 from rcilab.core.errors import InvalidValueError, RcilabError, UsageError
 from rcilab.core.fault import name_faults
@@ -56,7 +56,9 @@ def add_parser(subparsers: Any) -> None:
     )
     add_arm_options(parser)
     add_cell_option(
-        parser, "checks distances from its obstacles, with its tool and load, in place of --tool and --load"
+        parser,
+        "checks distances from its obstacles, with its tool and load, in place of --tool and --load; has the frames of "
+        "waypoints",
     )
     parser.add_argument(
         "--slow-down",
@@ -189,7 +191,7 @@ def _read_motion(args: Namespace, cell: Cell | None) -> _Subject:
     from rcilab.motion import Program
     from rcilab.motion.program import box_numbers, payload_numbers, tool_numbers
 
-    found = read_file(args.file, args.max_rows)
+    found = resolved(read_file(args.file, args.max_rows), cell, args.file)
     model_name = args.model
     if cell is not None and args.model is None and not isinstance(found, Program):
         model_name = cell.model

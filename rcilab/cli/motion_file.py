@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rcilab.core.atomic_file import read_limited
-from rcilab.core.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
 
 if TYPE_CHECKING:
+    from rcilab.cell.cell import Cell
     from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion, Program
 
@@ -46,6 +47,35 @@ def read_file(file: Path, max_rows: int = DEFAULT_MAX_ROWS) -> Motion | Program:
     if file.suffix.lower() == ".rcirun" and os.path.isfile(file):
         raise InvalidValueError("motion file", file.name, f"is a recorded run: open it with `rcilab replay {file}`")
     return Program.load(file) if file.suffix.lower() == ".json" else Motion.load(file, max_rows=max_rows)
+
+
+def resolved(found: Motion | Program, cell: Cell | None, file: Path) -> Motion | Program:
+    """Returns a program with all waypoints in base, and a motion as it is.
+
+    Args:
+        found: Result of `read_file`.
+        cell: The cell that has the frames of waypoints.
+        file: Its file, for the line of a waypoint in an error.
+
+    Raises:
+        UsageError: Waypoints are in frames, and there is no cell.
+        InvalidValueError: A waypoint is in a frame that the cell does not have.
+    """
+    from rcilab.motion import Program
+
+    if not isinstance(found, Program) or not found.frames:
+        return found
+    if cell is None:
+        raise UsageError(
+            f"{file.name} has waypoints in frames ({', '.join(found.frames)}): add --cell CELL, the cell that has them"
+        )
+    try:
+        return found.resolved(cell.frame_poses)
+    except InvalidValueError as error:
+        number = error.facts["number"]
+        assert isinstance(number, int)  # The error names a waypoint.
+        line = _line_of(number, file)
+        raise InvalidValueError(f"{file.name}, line {line}, {error.name}", error.value, error.requirement) from error
 
 
 def as_motion(

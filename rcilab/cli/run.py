@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 from rcilab.cli.arm_options import add_cell_option, read_cell
-from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
+from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file, resolved
 from rcilab.cli.output import drop_output, drop_unread_output, show
 from rcilab.cli.signal_handlers import handled_signals
 from rcilab.core.errors import (
@@ -75,7 +75,10 @@ def add_parser(subparsers: Any) -> None:
         help="first send tool, load and safety box of the program, or tool and load of the cell, to the controller; "
         "without it, reports what differs",
     )
-    add_cell_option(parser, "checks distances from its obstacles, with its tool and load; --apply sends these")
+    add_cell_option(
+        parser,
+        "checks distances from its obstacles, with its tool and load; --apply sends these; has frames of waypoints",
+    )
     parser.add_argument("--yes", action="store_true", help="do not ask; for scripts that have asked before")
     parser.add_argument(
         "--json",
@@ -170,9 +173,10 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
         require_ending(args.save.suffix)
         if not args.save.parent.is_dir():  # Before anything moves.
             raise InvalidValueError("--save", str(args.save), "is in a folder that does not exist")
-    found = read_file(args.file, args.max_rows)
+    cell = read_cell(args.cell)
+    found = resolved(read_file(args.file, args.max_rows), cell, args.file)
     model = load_model(args.model) if args.model else None
-    box, cell = None, read_cell(args.cell)
+    box = None
     if isinstance(found, Program):
         model, box = found.applied_to(model or load_model(found.model)), found.safety_box
     elif args.apply and cell is None:

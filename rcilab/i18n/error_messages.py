@@ -17,7 +17,7 @@ _REQUIREMENTS = frozenset(
     {
         "span", "least", "rounds", "missing", "missing_beside", "unknown", "axes", "turns", "no_unit", "beyond",
         "no_number", "numbers", "target_shape", "not_finite", "no_meaning", "no_target", "second_target",
-        "second_angle", "six_axes",
+        "second_angle", "six_axes", "frame_of_angles",
         "no_direction", "one_line", "box_size", "table_cell", "table_columns", "table_titles", "table_twice",
         "table_order",
     }

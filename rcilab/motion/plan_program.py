@@ -28,7 +28,7 @@ from rcilab.motion.segment import Segment, build_segments, naming
 from rcilab.motion.segment_spline import build_segment_spline
 from rcilab.motion.segment_spline_motion import plan_segment_spline
 from rcilab.motion.torque_rate import plan_within_torque_rate
-from rcilab.motion.waypoint import MOST_WAYPOINTS, label
+from rcilab.motion.waypoint import MOST_WAYPOINTS, label, named_value
 
 _NOTED_DIFFERENCE = 1e-6
 """A radius that is shortened by more than this is noted, [m]."""
@@ -62,7 +62,7 @@ def plan_program(
 
     Args:
         model: The arm; its tool and its load apply if the program has none.
-        program: The waypoints.
+        program: The waypoints, all in base.
         speed: Factor on the speed of every waypoint, above 0 to 1.
         start: Joint angles of the stationary arm, shape (n,), [rad]. If they differ from the program's start, a joint
             move to it comes first, at the speed of the first waypoint, as segment 0. None begins at the program's
@@ -77,7 +77,7 @@ def plan_program(
     Raises:
         PlanningError: A target is out of reach, or a joint limit or a singularity is in the way; the message names the
             waypoint, the position and the reason. Or the motion takes too long.
-        InvalidValueError: The program is for another arm, or an argument is out of range.
+        InvalidValueError: The program is for another arm, or has waypoints in frames, or an argument is out of range.
     """
     speed = _require_valid(model, program, speed, rounds, law, max_rows)
     count = len(program.waypoints)
@@ -133,6 +133,11 @@ def _require_valid(
         raise InvalidValueError(
             "program", program.model, f"is the model of the program, not {model.name}; load that model"
         ).coded("program_model", theirs=program.model, ours=model.name)
+    for number, waypoint in enumerate(program.waypoints, 1):
+        if waypoint.frame is not None:
+            problem = "is not base: plan program.resolved(cell.frame_poses), with the cell that has this frame"
+            error = InvalidValueError("frame", waypoint.frame, problem).coded("unresolved", frame=waypoint.frame)
+            raise named_value(number, waypoint.type, error)
     speed = as_number(speed, "speed")
     if not 0.0 < speed <= 1.0:
         raise InvalidValueError("speed", speed, "must be above 0, to 1: a part of the waypoints' speeds").coded(

@@ -5,8 +5,8 @@ The script is Python that plans the same motion, prints its report and optionall
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields, replace
 from os import PathLike
 from typing import TYPE_CHECKING
 
@@ -36,14 +36,18 @@ program = Program(
 
 _TAIL = """
 model = program.applied_to(rcilab.load_model(program.model))
-motion = rcilab.plan_program(model, program, law="torque_rate_limited")
+{resolve}motion = rcilab.plan_program(model, program, law="torque_rate_limited")
 
 if __name__ == "__main__":
-    report = rcilab.check(motion, model, box=program.safety_box)
+    report = rcilab.check(motion, model, box=program.safety_box{cell})
     print(report)
     if len(sys.argv) > 1:
         motion.save(sys.argv[1])
     sys.exit(0 if report.ok else 1)
+"""
+
+_RESOLVE = """cell = rcilab.Cell.load("cell.json")  # The cell that has the frames of the waypoints.
+program = program.resolved(cell.frame_poses)
 """
 
 
@@ -124,6 +128,32 @@ class Program:
         except InvalidValueError as error:
             raise InvalidValueError("box", self.box, f"is not valid: {error}") from error
 
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """Names of the frames that waypoints are given in; empty if all are in base."""
+        return tuple(dict.fromkeys(waypoint.frame for waypoint in self.waypoints if waypoint.frame is not None))
+
+    def resolved(self, frames: Mapping[str, Pose]) -> Program:
+        """Returns the program with all waypoints in base, as `plan_program` requires it.
+
+        Args:
+            frames: Pose of each frame in base by its name, such as `cell.frame_poses`.
+
+        Raises:
+            InvalidValueError: A waypoint is in another frame, or too far away from the base.
+        """
+        if not isinstance(frames, Mapping):
+            raise InvalidValueError("frames", described(frames), "must be poses by name; use cell.frame_poses")
+        waypoints: list[Waypoint] = []
+        for number, waypoint in enumerate(self.waypoints, 1):
+            try:
+                waypoints.append(
+                    waypoint if waypoint.frame is None else waypoint.in_base(_find(frames, waypoint.frame))
+                )
+            except InvalidValueError as error:
+                raise named_value(number, waypoint.type, error) from error
+        return replace(self, waypoints=tuple(waypoints))
+
     def applied_to(self, model: RobotModel) -> RobotModel:
         """Returns the arm with the tool and the load of this program, each unless it is None."""
         tool, payload = self.T_flange_tool, self.payload
@@ -168,7 +198,10 @@ class Program:
         return load_program(file, cls)
 
     def to_python(self) -> str:
-        """Returns a script that plans the same motion; `python SCRIPT [OUT.npz]` prints its report."""
+        """Returns a script that plans the same motion; `python SCRIPT [OUT.npz]` prints its report.
+
+        If waypoints are in frames, the script takes them from the cell in cell.json, and checks with it.
+        """
         return program_script(self)
 
     def __repr__(self) -> str:
@@ -207,7 +240,16 @@ def program_script(program: Program) -> str:
     head += [("payload", program.payload), ("box", program.box), ("start", program.start)]
     lines = [f"    {key}={value!a},\n" for key, value in head if value not in (None, "")]
     waypoints = "".join(f"        {_call(waypoint)},\n" for waypoint in program.waypoints)
-    return _HEAD + "".join(lines) + f"    waypoints=(\n{waypoints}    ),\n)\n" + _TAIL
+    tail = _TAIL.format(resolve=_RESOLVE, cell=", cell=cell") if program.frames else _TAIL.format(resolve="", cell="")
+    return _HEAD + "".join(lines) + f"    waypoints=(\n{waypoints}    ),\n)\n" + tail
+
+
+def _find(frames: Mapping[str, Pose], name: str) -> Pose:
+    if name in frames:
+        return frames[name]
+    known = ", ".join(frames)
+    error = InvalidValueError("frame", name, f"does not exist; there are: {known or 'none'}")
+    raise error.coded("no_frame", frame=name, known=known or "–")
 
 
 def _call(waypoint: Waypoint) -> str:

@@ -153,7 +153,7 @@ def _waypoint(node: Node, number: int, name: str, robot: RobotDescription) -> Wa
         if key == "type" or (value.value is None and key not in COMMON_FIELDS):
             continue
         what = f"{kind}, {key}"
-        read = read_number if key in _SCALARS else read_text if key in CHOICES else read_vector
+        read = read_number if key in _SCALARS else read_text if key in ("frame", *CHOICES) else read_vector
         values[key] = read(name, value, what)
     try:
         waypoint = Waypoint(**values)

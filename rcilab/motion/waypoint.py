@@ -31,10 +31,10 @@ _UNIT_TOLERANCE = 1e-3
 COMMON_FIELDS = ("speed", "blend", "dwell")
 """Fields of every waypoint."""
 ALLOWED: dict[WaypointType, tuple[str, ...]] = {
-    "joint": ("q", "position", "wxyz", "psi"),
-    "line": ("q", "position", "wxyz", "psi"),
-    "arc": ("via", "via_wxyz", "q", "position", "wxyz", "psi"),
-    "circle": ("center", "axis", "angle", "orientation", "psi"),
+    "joint": ("q", "position", "wxyz", "frame", "psi"),
+    "line": ("q", "position", "wxyz", "frame", "psi"),
+    "arc": ("via", "via_wxyz", "q", "position", "wxyz", "frame", "psi"),
+    "circle": ("center", "axis", "frame", "angle", "orientation", "psi"),
     "nullspace": ("psi", "way"),
 }
 """Further fields of a waypoint by type."""
@@ -72,17 +72,20 @@ class Waypoint:
     q: Floats | None = None
     """Target as joint angles, n of them, [rad]; for a line or an arc the pose and the arm angle at them."""
     position: Floats | None = None
-    """Target: position of the tool in base, 3 numbers, [m]; with `wxyz`."""
+    """Target: position of the tool in `frame`, 3 numbers, [m]; with `wxyz`."""
     wxyz: Floats | None = None
-    """Target: orientation of the tool in base, 4 numbers, a unit quaternion."""
+    """Target: orientation of the tool in `frame`, 4 numbers, a unit quaternion."""
     via: Floats | None = None
-    """A point on the arc, in base, 3 numbers, [m]."""
+    """A point on the arc, in `frame`, 3 numbers, [m]."""
     via_wxyz: Floats | None = None
     """Orientation of the tool at `via`, 4 numbers, a unit quaternion; None is a slerp from start to target."""
     center: Floats | None = None
-    """Centre of the circle in base, 3 numbers, [m]."""
+    """Centre of the circle in `frame`, 3 numbers, [m]."""
     axis: Floats | None = None
-    """Axis of the circle in base, 3 numbers of any length; the tool goes around it by the right-hand rule."""
+    """Axis of the circle in `frame`, 3 numbers of any length; the tool goes around it by the right-hand rule."""
+    frame: str | None = None
+    """Name of the work frame that position, wxyz, via, via_wxyz, center and axis are given in; None: base. Not with
+    joint angles. `Program.resolved` puts all waypoints in base."""
     angle: float | None = None
     """Angle around the circle, more than 0 up to 2 pi, [rad]; None is the full circle."""
     orientation: CircleOrientation | None = None
@@ -124,9 +127,10 @@ class Waypoint:
                 raise missing.coded("missing", type=self.type, names=", ".join(REQUIRED[self.type]))
             if name in CHOICES:
                 _require_choice(name, value)
-            elif value is not None and name not in ("q", "angle", "psi"):
+            elif value is not None and name not in ("q", "frame", "angle", "psi"):
                 object.__setattr__(self, name, vector_of(name, value))
         self._require_target()
+        self._require_frame()
         for name, lowest, highest, unit in _RANGES:
             value = getattr(self, name)
             if value is None:
@@ -141,46 +145,55 @@ class Waypoint:
     @classmethod
     def joint(
         cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = DEFAULT_SPEED, blend: float = 0.0,
-        dwell: float = 0.0,
+        dwell: float = 0.0, frame: str | None = None,
     ) -> Waypoint:  # fmt: skip
         """Returns a straight move in joint space, to joint angles, shape (n,), [rad], or to a pose of the tool.
 
-        A pose is reached on the branch closest to the previous joint angles.
+        A pose, in base or in a named frame, is reached on the branch closest to the previous joint angles.
         """
-        return cls(type="joint", **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
+        return cls(type="joint", **_target(target), frame=frame, psi=psi, speed=speed, blend=blend, dwell=dwell)
 
     @classmethod
     def line(
         cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = DEFAULT_SPEED, blend: float = 0.0,
-        dwell: float = 0.0,
+        dwell: float = 0.0, frame: str | None = None,
     ) -> Waypoint:  # fmt: skip
-        """Returns a straight line of the tool to a pose, or to the pose at joint angles, shape (n,), [rad]."""
-        return cls(type="line", **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
+        """Returns a straight line of the tool to a pose, or to the pose at joint angles, shape (n,), [rad].
+
+        The pose is in base, or in a named frame.
+        """
+        return cls(type="line", **_target(target), frame=frame, psi=psi, speed=speed, blend=blend, dwell=dwell)
 
     @classmethod
     def arc(
         cls, via: Pose | ArrayLike, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = DEFAULT_SPEED,
-        blend: float = 0.0, dwell: float = 0.0,
+        blend: float = 0.0, dwell: float = 0.0, frame: str | None = None,
     ) -> Waypoint:  # fmt: skip
-        """Returns an arc of the tool through `via`: a pose, or only a position, shape (3,), [m]."""
+        """Returns an arc of the tool through `via`: a pose, or only a position, shape (3,), [m].
+
+        Both are in base, or in a named frame.
+        """
         via_fields: dict[str, Any] = {"via": via}
         if isinstance(via, Pose) or is_transform(via):
             via = as_pose(via, "via")
             via_fields = {"via": via.position, "via_wxyz": via.wxyz}
-        return cls(type="arc", **via_fields, **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
+        return cls(
+            type="arc", **via_fields, **_target(target), frame=frame, psi=psi, speed=speed, blend=blend, dwell=dwell
+        )  # fmt: skip
 
     @classmethod
     def circle(
         cls, center: ArrayLike, axis: ArrayLike, angle: float | None = None, *,
         orientation: CircleOrientation = "held", psi: float | None = None, speed: float = DEFAULT_SPEED,
-        blend: float = 0.0, dwell: float = 0.0,
+        blend: float = 0.0, dwell: float = 0.0, frame: str | None = None,
     ) -> Waypoint:  # fmt: skip
         """Returns a circle, or a part of it, around a centre, shape (3,), [m], and an axis, shape (3,).
 
-        The tool keeps its orientation ("held"), or it turns with the circle ("turning").
+        Centre and axis are in base, or in a named frame. The tool keeps its orientation ("held"), or it turns with the
+        circle ("turning").
         """
         return cls(
-            type="circle", center=vector_of("center", center), axis=vector_of("axis", axis), angle=angle,
+            type="circle", center=vector_of("center", center), axis=vector_of("axis", axis), frame=frame, angle=angle,
             orientation=orientation, psi=psi, speed=speed, blend=blend, dwell=dwell,
         )  # fmt: skip
 
@@ -194,7 +207,7 @@ class Waypoint:
 
     @property
     def pose(self) -> Pose | None:
-        """The target as a pose, if it was given as one."""
+        """The target as a pose in `frame`, if it was given as one."""
         return None if self.position is None or self.wxyz is None else Pose(self.position, self.wxyz)
 
     def retyped(self, type: WaypointType, via: ArrayLike | None = None) -> Waypoint:
@@ -213,6 +226,34 @@ class Waypoint:
                 raise error.coded("no_target")
         point = None if via is None else vector_of("via", via)
         return replace(self, type=type, via=point, via_wxyz=None)
+
+    def in_base(self, T_base_frame: Pose | ArrayLike) -> Waypoint:
+        """Returns the waypoint with its numbers in base; one that has no frame stays as it is.
+
+        Args:
+            T_base_frame: Pose of its frame in base, or a matrix, shape (4, 4).
+
+        Raises:
+            InvalidValueError: The pose is not valid, or a position is too far away from the base.
+        """
+        if self.frame is None:
+            return self
+        return replace(self, frame=None, **_transformed(self, as_pose(T_base_frame, "pose of the frame")))
+
+    def in_frame(self, T_base_frame: Pose | ArrayLike, name: str) -> Waypoint:
+        """Returns the waypoint, which is in base, with its numbers in a frame: the inverse of `in_base`.
+
+        Args:
+            T_base_frame: Pose of the frame in base, or a matrix, shape (4, 4).
+            name: Name of the frame.
+
+        Raises:
+            InvalidValueError: The waypoint has a frame, or has only joint angles, or the pose or the name is not valid.
+        """
+        if self.frame is not None:
+            raise InvalidValueError("frame", self.frame, "is the frame of this waypoint; use in_base(...) first")
+        T_frame_base = as_pose(T_base_frame, "pose of the frame").inverse()
+        return replace(self, frame=name, **_transformed(self, T_frame_base))
 
     def _require_target(self) -> None:
         if "q" not in ALLOWED[self.type]:
@@ -233,6 +274,17 @@ class Waypoint:
             if has_pose and getattr(self, name) is None:
                 missing = InvalidValueError(name, None, f"is missing: a pose has {other} and {name}")
                 raise missing.coded("missing_beside", other=other)
+
+    def _require_frame(self) -> None:
+        if self.frame is None:
+            return
+        if not (isinstance(self.frame, str) and self.frame.strip() and self.frame.isprintable()):
+            error = InvalidValueError("frame", described(self.frame), "must be the name of a frame, text in one line")
+            raise error.coded("one_line")
+        if self.q is not None:
+            problem = "has no meaning with q: joint angles are in no frame; give position and wxyz in place of q"
+            raise InvalidValueError("frame", self.frame, problem).coded("frame_of_angles")
+        object.__setattr__(self, "frame", self.frame.strip())
 
 
 _OPTIONAL = tuple(field.name for field in fields(Waypoint) if field.default is None)
@@ -299,6 +351,20 @@ def angles_of(value: ArrayLike, name: str, n: int | None = None, robot: str = ""
             problem = f"rad of joint {joint} is more than two turns, {MAX_ANGLE:.4g} rad; multiply degrees by pi / 180"
             raise InvalidValueError(name, angle, problem).coded("turns", joint=joint)
     return angles
+
+
+def _transformed(waypoint: Waypoint, T: Pose) -> dict[str, Floats]:
+    """Returns position, orientation, via, centre and axis, as far as a waypoint has them, transformed by T."""
+    found: dict[str, Floats] = {}
+    for name in ("position", "via", "center"):
+        if (point := getattr(waypoint, name)) is not None:
+            found[name] = tuple((T @ np.array(point)).tolist())
+    for name in ("wxyz", "via_wxyz"):
+        if (wxyz := getattr(waypoint, name)) is not None:
+            found[name] = tuple((T @ Pose(wxyz=wxyz)).wxyz.tolist())
+    if waypoint.axis is not None:
+        found["axis"] = tuple((T.rotation @ waypoint.axis).tolist())
+    return found
 
 
 def _require_choice(name: str, value: object) -> None:

@@ -47,7 +47,9 @@ from rcilab.sim.ideal_plant import IdealPlant
 
 MODEL = load_model("xMatePro7")
 HOME = np.array(MODEL.home)
-KEYS = "position wxyz psi via type model start speed blend dwell rounds q1 q2 joint line arc circle nullspace spline"
+KEYS = (
+    "position wxyz frame psi via type model start speed blend dwell rounds q1 q2 joint line arc circle nullspace spline"
+)
 ARMS = "xMatePro7 xMatePro3 xMate3 MuJoCo"
 WORDS = "rcilab RCI IP UDP URDF JSON CSV UTF StartMove AutomaticErrorRecovery MoveJ MoveL MoveC rci rad mm deg kg MB"
 NAMES = rf"{f'{ARMS} {KEYS} {WORDS}'.replace(' ', '|')}|[xyzw]\b"
@@ -161,6 +163,9 @@ PROVOKED: dict[str, Callable[[], object]] = {
     "a file with a strange type": bad_text('"type": "line"', '"type": "spline"'),
     "a file with a via for a line": bad_text('"position"', '"via": [0.1, 0.2, 0.3], "position"'),
     "an arm angle for 6 axes": lambda: load_model("xMate3").inverse(load_model("xMate3").forward(np.zeros(6)), psi=0.1),
+    "a frame that is missing": lambda: program(Waypoint.line(moved(0.05), frame="托盘")).resolved({}),
+    "a program in frames": lambda: plan_program(MODEL, program(Waypoint.line(moved(0.05), frame="托盘"))),
+    "a frame of angles": lambda: Waypoint.joint(HOME, frame="托盘"),
     "a program for another arm": lambda: plan_program(load_model("xMatePro3"), program(Waypoint.line(moved(0.05)))),
     "a speed of nothing": lambda: plan_joint(MODEL, HOME, HOME + 0.1, speed=0.0),
     "rounds without number": lambda: plan_program(MODEL, program(Waypoint.line(moved(0.05))), rounds=0),

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from browser.test_settings import choose
+from rcilab.app.cell.cell_actions import EditCell
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import LoadProgram
 from rcilab.app.view_actions import SetView
@@ -99,3 +101,22 @@ def test_a_waypoint_of_a_file_has_its_own_type_in_the_editor(writing):
     assert page.state.program.draft.steps[1].waypoint.type == "line"  # It goes on as a path of the tool.
     page.wait(lambda: field(page, "Type").input_value() == "MoveL", "the type of the new waypoint")
     page.wait(lambda: not field(page, "Type").is_disabled(), "a type that can be changed")
+
+
+def test_a_waypoint_is_expressed_in_a_frame_of_the_cell(writing):
+    page, steps = writing, lambda: writing.state.program.draft.steps
+    assert page.tab.locator("label:visible", has_text="Frame").count() == 0
+    page.bench.dispatcher.ask(EditCell(what="add", name="frame"))
+    page.wait(lambda: page.tab.locator("label:visible", has_text="Frame").count() == 1, "the choice of a frame")
+    selected = [step.key for step in steps()].index(page.state.program.selected)
+    here = page.state.model.forward(np.array(steps()[selected].waypoint.q)).position
+    page.tab.get_by_label("Frame", exact=True).locator("visible=true").first.click()
+    page.tab.get_by_role("option", name="Frame", exact=True).locator("visible=true").click()
+    page.wait(lambda: steps()[selected].waypoint.frame == "Frame", "the waypoint in the frame")
+    T = page.state.cell.cell.T_base("Frame")
+    assert np.allclose(T @ np.array(steps()[selected].waypoint.position), here)
+    x = 1000.0 * steps()[selected].waypoint.position[0]
+    page.wait(lambda: abs(float(field(page, "x").input_value()) - x) < 0.1, "its number in the frame")
+    page.bench.dispatcher.ask(EditCell(what="clear"))
+    page.tab.get_by_text("The cell has no frame Frame").first.wait_for(state="visible")
+    page.wait(lambda: field(page, "Frame").input_value() == "Frame", "the missing frame")

@@ -12,7 +12,7 @@ import pytest
 import rcilab
 from rcilab.app.text import Text as PageText
 from rcilab.cell.cell import Cell
-from rcilab.cell.entries import Obstacle
+from rcilab.cell.entries import Frame, Obstacle
 from rcilab.cell.shapes import Box, Solid
 from rcilab.cell.tool import Tool
 from rcilab.cli import main
@@ -88,8 +88,41 @@ def test_run_refuses_a_motion_through_a_wall_and_runs_it_where_there_is_none(fil
         assert captured.err == "The motion does not conform; nothing was sent.\n"
         assert main([*argv, str(files / "free.zip")]) == 0
         assert "<Run" in capsys.readouterr().out
+        program, cell = in_tray(files)
+        assert main(["run", program, "--robot", controller.address, "--yes", "--cell", cell]) == 0
+        assert "<Run" in capsys.readouterr().out
     finally:
         controller.end()
+
+
+def in_tray(files: Path) -> tuple[str, str]:
+    """A program with a waypoint in a frame, from the goal back, and the cell with this frame."""
+    tray, there = (
+        Pose.from_rpy((0.3, 0.1, 0.2), (0.0, 0.0, 0.4)),
+        MODEL.with_tool(TOOL.T_flange_tool).forward(MODEL.home),
+    )
+    program, cell = files / "tray.json", files / "tray_cell.json"
+    waypoint = Waypoint.joint(tray.inverse() @ there, speed=0.5, frame="tray")
+    Program(model=MODEL.name, start=tuple(GOAL.tolist()), waypoints=(waypoint,)).save(program)
+    replace(CELL, obstacles=(), frames=(Frame(name="tray", T_parent_frame=tray),)).save(cell)
+    return str(program), str(cell)
+
+
+def test_waypoints_in_a_frame_are_those_of_the_cell(files, capsys):
+    program, cell = in_tray(files)
+    assert main(["check", program, "--cell", cell, "--slow-down", str(files / "out.npz")]) == 0
+    capsys.readouterr()
+    arm = MODEL.with_tool(TOOL.T_flange_tool)
+    end = rcilab.Motion.load(files / "out.npz").q[-1]
+    assert arm.forward(end).is_close(arm.forward(MODEL.home), 1e-6)
+    for argv in (["check", program], ["run", program, "--robot", "rci://127.0.0.1:9", "--yes"]):
+        assert main(argv) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line == "rcilab: tray.json has waypoints in frames (tray): add --cell CELL, the cell that has them"
+    assert main(["check", program, "--cell", str(files / "free.zip")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    expected = "tray.json, line 8, waypoint 1 (joint), frame: 'tray' does not exist; there are: world"
+    assert line == f"rcilab: {expected}"
 
 
 @pytest.mark.parametrize(

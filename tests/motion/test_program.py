@@ -58,21 +58,23 @@ rests = {
 psis = st.none() | st.floats(-math.pi, math.pi)
 turns = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda x: math.hypot(*x) > 0.1)
 poses = st.builds(Pose, places, turns)
+printable = st.text(st.characters(exclude_categories=("C", "Z")))
+frames = st.none() | printable.filter(bool)
 waypoints = st.one_of(
     st.builds(Waypoint.joint, st.tuples(*[angles] * 7), **rests),
-    st.builds(Waypoint.line, poses, psi=psis, **rests),
-    st.builds(Waypoint.arc, places | poses, poses, psi=psis, **rests),
+    st.builds(Waypoint.line, poses, psi=psis, frame=frames, **rests),
+    st.builds(Waypoint.arc, places | poses, poses, psi=psis, frame=frames, **rests),
     st.builds(
         Waypoint.circle,
         places,
         places.filter(lambda x: math.hypot(*x) > 0.01),
         st.floats(0.1, 6.2),
         orientation=st.sampled_from(["held", "turning"]),
+        frame=frames,
         **rests,
     ),
     st.builds(Waypoint.nullspace, st.floats(-math.pi, math.pi), way=st.sampled_from(["shorter", "longer"]), **rests),
 )
-printable = st.text(st.characters(exclude_categories=("C", "Z")))
 
 
 @cache
@@ -145,8 +147,11 @@ def test_the_schema_knows_what_the_class_knows():
     for kind, allowed in ALLOWED.items():
         assert waypoint_alone.is_valid({"type": kind, **_least(kind)})
         for key in set(properties) - {"type", *COMMON_FIELDS, *allowed}:
-            value = {"angle": 1.0, "psi": 1.0, "orientation": "held", "way": "longer"}.get(key, [1.0, 0.0, 0.0])
-            assert not waypoint_alone.is_valid({"type": kind, **_least(kind), key: value}), (kind, key)
+            value = {"angle": 1.0, "psi": 1.0, "orientation": "held", "way": "longer", "frame": "tray"}
+            wrong = {"type": kind, **_least(kind), key: value.get(key, [1.0, 0.0, 0.0])}
+            assert not waypoint_alone.is_valid(wrong), (kind, key)
+        if "q" in _least(kind):
+            assert not waypoint_alone.is_valid({"type": kind, **_least(kind), "frame": "tray"})
 
 
 def _least(kind):
@@ -244,6 +249,9 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
             "orientation: 'held' has no meaning here; nullspace",
         ),
         ('{"type": "arc", "q": [0,0,0,0,0,0,0]}', "via is missing: arc needs via"),
+        ('{"type": "line", "q": [0,0,0,0,0,0,0], "frame": "tray"}', "line 6, .*frame: 'tray' has no meaning with q"),
+        ('{"type": "nullspace", "psi": 1,\n"frame": "tray"}', "line 7, .*frame: 'tray' has no meaning here"),
+        ('{"type": "nullspace", "psi": 1, "frame": 3}', "line 6, waypoint 2, frame must be text in double quotes"),
         ('{"type": "line" "q": 1}', 'line 6: "q" is neither a comma|is neither a comma nor the end of the object'),
         ('{"type": "line", q: 1}', "line 6: q is not a key; a key is text in double quotes"),
         ('{"type" "line"}', "is not a colon; the key 'type' needs one"),

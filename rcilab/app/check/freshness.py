@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rcilab.app.planning import moved_frames
 from rcilab.app.setup.configuration_state import name_parts
 from rcilab.i18n.translator import Message, message
 
@@ -21,7 +22,7 @@ def beside_program(state: UiState) -> Message | None:
 
 
 def outdated(state: UiState) -> Message | None:
-    """Returns why the plan is out of date, or None: program, tool, load, joint limits, safety box or cell changed."""
+    """Returns why the plan is out of date, or None: program, frames, tool, load, limits, safety box or cell changed."""
     plan, program = state.plan, state.program
     if plan is None or (state.watched and plan.is_recorded):  # What a client commanded stays what it is.
         return None
@@ -35,4 +36,7 @@ def outdated(state: UiState) -> Message | None:
             return message("ready.program")
     if plan.program is not None and not program.draft.is_for(state.model):
         return message("ready.program_tool")
+    moved = moved_frames(plan, state.cell.cell)
+    if moved:
+        return message("ready.frames", names=", ".join(moved))
     return message("ready.stale", what=name_parts(stale)) if stale else None

@@ -57,11 +57,13 @@ def slow_program(plan: Plan, draft: Draft, rounds: int, progress: ProgressCallba
 
     def make(scale: float) -> Plan | None:
         drafts[scale] = slower = scaled(draft, scale)
-        program = slower.program(plan.model)
-        assert program is not None
+        made = slower.program(plan.model)
+        assert made is not None
+        program = made.resolved(plan.frames)
         motion = plan_program(plan.model, program, start=plan.motion.start, rounds=rounds, law=PROGRAM_LAW)
         report = check(motion, plan.model, start=plan.motion.start, box=plan.box, distance=None)
-        return replace(build_plan_view(plan.model, motion, report, plan.box), program=program).completed(cell=plan.cell)
+        view = build_plan_view(plan.model, motion, report, plan.box)
+        return replace(view, program=program, frames=plan.frames).completed(cell=plan.cell)
 
     slowest = min((step.waypoint.speed for step in draft.steps), default=1.0)
     result = _slower(plan, make, SLOWEST / slowest, progress)
@@ -95,5 +97,6 @@ def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, prog
     assert found.motion is not None
     assert found.report is not None
     whole = build_plan_view(plan.model, found.motion, found.report, plan.box)
-    whole = replace(whole, missed_by=plan.missed_by, program=plan.program, cell=plan.cell, complete=True)
+    whole = replace(whole, missed_by=plan.missed_by, program=plan.program, frames=plan.frames)
+    whole = replace(whole, cell=plan.cell, complete=True)
     return SlowdownJob(found=found, plan=whole, scale=1.0 / found.factor, is_stretched=True)

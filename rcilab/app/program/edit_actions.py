@@ -8,12 +8,15 @@ from typing import Literal
 
 from rcilab.app.connection import PageConnection
 from rcilab.app.goal.goal_actions import GoalActions
-from rcilab.app.program.program_draft import MOST_ROUNDS, TYPES, Draft, target_of, time_at
+from rcilab.app.program.program_draft import MOST_ROUNDS, TYPES, Draft, placed, target_of, time_at
 from rcilab.app.program.program_history import ProgramHistory
-from rcilab.app.program.waypoint_fields import default_via, proposed
+from rcilab.app.program.waypoint_fields import as_pose, default_via, proposed
 from rcilab.app.request import Handlers, Request, TypeField
+from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store
 from rcilab.core.arrays import JointVector, readonly_copy
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.spatial import Pose
 from rcilab.i18n.number_parsing import parse_number
 from rcilab.i18n.translator import Message, message
 from rcilab.motion.waypoint import Waypoint
@@ -26,14 +29,16 @@ class EditProgram(Request):
     """Change the program of the Program tab, or its selection."""
 
     what: Literal[
-        "select", "add", "teach", "via", "type", "delete", "duplicate", "up", "down", "move", "start", "aim", "undo",
-        "redo", "clear", "script", "tool",
+        "select", "add", "teach", "via", "type", "frame", "delete", "duplicate", "up", "down", "move", "start", "aim",
+        "undo", "redo", "clear", "script", "tool",
     ]  # fmt: skip
     key: int | None = None
     """Key of a step; None is the selected one."""
     source: Literal["here", "target"] = "here"
     """Source of a waypoint, or its via point: the arm, or the goal."""
     type: str = ""
+    frame: str | None = None
+    """Name of a frame of the cell; None is base."""
     index: int = 0
     """New index of a step, from 0."""
 
@@ -52,7 +57,7 @@ class EditActions:
         self._store, self._connection, self._goal, self._history = store, connection, goal, history
         self._edits: dict[str, Callable[[EditProgram, int], None]] = {
             "select": self._select, "teach": self._teach, "via": self._via, "type": self._retype,
-            "delete": self._delete, "duplicate": self._duplicate, "aim": self._aim,
+            "frame": self._reframe, "delete": self._delete, "duplicate": self._duplicate, "aim": self._aim,
             "up": lambda request, key: self._move(key, -1), "down": lambda request, key: self._move(key, 1),
             "move": self._move_to,
         }  # fmt: skip
@@ -108,6 +113,47 @@ class EditActions:
     @property
     def _draft(self) -> Draft:
         return self._history.draft
+
+    @property
+    def _frames(self) -> dict[str, Pose]:
+        """Pose in base of each frame of the cell."""
+        cell = self._store.state.cell.cell
+        return {} if cell is None else cell.frame_poses
+
+    def _in_base(self, key: int) -> Waypoint | None:
+        """Returns the waypoint of a step in base; reports why that is not possible."""
+        waypoint, frames = self._draft.waypoint(key), self._frames
+        if waypoint is None or waypoint.frame is None:
+            return waypoint
+        if waypoint.frame not in frames:
+            self._store.notify("warn", message("program.frame_missing", frame=waypoint.frame))
+            return None
+        try:
+            return waypoint.in_base(frames[waypoint.frame])
+        except InvalidValueError as error:
+            self._store.notify("warn", explain_error(error))
+            return None
+
+    def _change_in_base(self, key: int, waypoint: Waypoint, frame: str | None) -> None:
+        """Replaces a waypoint by one that is in base, and expresses it in a frame."""
+        if frame is not None:
+            try:
+                arm = self._draft.arm(self._store.state.model)
+                waypoint = as_pose(waypoint, arm).in_frame(self._frames[frame], frame)
+            except InvalidValueError as error:
+                self._store.notify("warn", explain_error(error))
+                return
+        self._history.change(self._draft.changed(key, waypoint), key)
+
+    def _reframe(self, request: EditProgram, key: int) -> None:
+        """Expresses a waypoint in another frame; one whose frame is missing keeps its numbers."""
+        waypoint, frames = self._draft.waypoint(key), self._frames
+        if waypoint is None or request.frame == waypoint.frame or request.frame not in (None, *frames):
+            return
+        if waypoint.frame is not None and waypoint.frame not in frames:
+            self._history.change(self._draft.changed(key, replace(waypoint, frame=request.frame)), key)
+        elif (in_base := self._in_base(key)) is not None:
+            self._change_in_base(key, in_base, request.frame)
 
     def _take_setup(self) -> None:
         """Makes the program one for tool, load and safety box of the page."""
@@ -169,16 +215,20 @@ class EditActions:
         if waypoint.type not in TYPES:
             self._store.notify("warn", message("program.no_target"))
             return
-        taught = replace(waypoint, q=tuple(q.tolist()), position=None, wxyz=None, psi=None)
-        self._history.change(self._draft.changed(key, taught), key)
+        in_base = self._in_base(key)
+        if in_base is not None:
+            taught = replace(in_base, q=tuple(q.tolist()), position=None, wxyz=None, psi=None)
+            self._change_in_base(key, taught, waypoint.frame)
 
     def _via(self, request: EditProgram, key: int) -> None:
         q, waypoint = self._configuration(request.source), self._draft.waypoint(key)
         if q is None or waypoint is None or waypoint.type != "arc":
             return
         pose = self._draft.arm(self._store.state.model).forward(q)
-        via = replace(waypoint, via=tuple(pose.position.tolist()), via_wxyz=tuple(pose.wxyz.tolist()))
-        self._history.change(self._draft.changed(key, via), key)
+        in_base = self._in_base(key)
+        if in_base is not None:
+            via = replace(in_base, via=tuple(pose.position.tolist()), via_wxyz=tuple(pose.wxyz.tolist()))
+            self._change_in_base(key, via, waypoint.frame)
 
     def _retype(self, request: EditProgram, key: int) -> None:
         waypoint = self._draft.waypoint(key)
@@ -187,14 +237,17 @@ class EditActions:
         if waypoint.type not in TYPES:
             self._store.notify("warn", message("program.no_target"))
             return
-        via = None
+        in_base, via = self._in_base(key), None
+        if in_base is None:
+            return
         if request.type == "arc":
-            via = default_via(self._draft, key, self._draft.arm(self._store.state.model))
+            draft = placed(self._draft, self._store.state.cell.cell)
+            via = default_via(draft, key, draft.arm(self._store.state.model))
             if via is None:
                 self._store.notify("warn", message("program.no_way"))
                 return
             self._store.notify("good", message("program.via_made"))
-        self._history.change(self._draft.changed(key, waypoint.retyped(request.type, via)), key)
+        self._change_in_base(key, in_base.retyped(request.type, via), waypoint.frame)
 
     def _delete(self, request: EditProgram, key: int) -> None:
         index = self._draft.index(key) or 0
@@ -217,8 +270,9 @@ class EditActions:
             self._history.change(self._draft.moved(key, request.index), key)
 
     def _aim(self, request: EditProgram, key: int) -> None:
-        waypoint = self._draft.waypoint(key)
-        assert waypoint is not None
+        waypoint = self._in_base(key)
+        if waypoint is None:
+            return
         model = self._store.state.model
         arm = self._draft.arm(model)
         target = target_of(waypoint, arm)

@@ -12,7 +12,7 @@ from rcilab.app.connection import PageConnection
 from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.planning import Plan
 from rcilab.app.program.edit_actions import LONGEST_NAME, EditActions
-from rcilab.app.program.program_draft import FILE_FIELD, Draft, draft_of, is_led_in, notes_of, number_at
+from rcilab.app.program.program_draft import FILE_FIELD, Draft, draft_of, is_led_in, notes_of, number_at, placed
 from rcilab.app.program.program_history import ProgramHistory
 from rcilab.app.program.program_planning import Job, plan_job
 from rcilab.app.request import Handlers, Request
@@ -59,8 +59,8 @@ class ProgramActions:
     def __init__(self, store: Store, connection: PageConnection, goal: GoalActions) -> None:
         self._store, self._connection = store, connection
         self._planner: BackgroundJob[Job, Plan] = BackgroundJob("program")
-        # Model and safety box with which planning failed.
-        self._basis: tuple[RobotModel, SafetyBox | None] | None = None
+        # Model, safety box and program in base with which planning failed.
+        self._basis: tuple[RobotModel, SafetyBox | None, Draft] | None = None
         self._history = ProgramHistory(store, self._drop_planning)
         self.editing = EditActions(store, connection, goal, self._history)
 
@@ -93,16 +93,24 @@ class ProgramActions:
             return
         assert program is not None
         assert start is not None
+        cell = state.cell.cell
+        poses = {} if cell is None else cell.frame_poses
+        try:
+            in_base = program.resolved(poses)
+        except InvalidValueError as error:
+            self._store.notify("warn", message("plan.failed", error=describe_error(error)))
+            return
         job = Job(
             model=self._history.draft.arm(state.model),
             draft=self._history.draft,
-            program=program,
+            program=in_base,
+            frames={name: poses[name] for name in program.frames},
             here=readonly_copy(start),
             rounds=self._history.state.rounds,
             box=state.setup.wanted.box,
             cell=state.cell_for(self._history.draft.arm(state.model)),
         )
-        self._basis = state.model, job.box
+        self._basis = state.model, job.box, placed(job.draft, cell)
         self._planner.start(job, partial(plan_job, job))
         self._store.update(busy=message("program.planning"))
         self._store.clear_problems(FILE_FIELD)
@@ -212,9 +220,10 @@ class ProgramActions:
         return True
 
     def _is_failure_old(self) -> bool:
-        """Returns whether planning failed with another tool, load, joint limits or safety box than those of now."""
+        """Returns whether planning failed with another tool, load, joint limits, box or frames than those of now."""
         state = self._store.state
-        is_same = self._basis is not None and self._basis[0] is state.model and self._basis[1] is state.setup.wanted.box
+        now = state.model, state.setup.wanted.box, placed(self._history.draft, state.cell.cell)
+        is_same = self._basis is not None and all(then is it for then, it in zip(self._basis, now, strict=True))
         return self._history.state.planned is None and not is_same
 
     def _was_stretched(self) -> bool:

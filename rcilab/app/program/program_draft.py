@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import count
 
 import numpy as np
 
 from rcilab.app.goal.goal import Tone
 from rcilab.app.planning import Plan
+from rcilab.cell.cell import Cell
+from rcilab.cell.entries import Frame
+from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Message, Remark, message
@@ -205,8 +209,39 @@ def draft_of(program: Program, model: RobotModel) -> Draft:
 
 
 def target_of(waypoint: Waypoint, arm: RobotModel) -> Pose | None:
-    """Returns the pose of the tool at a waypoint; None if it depends on the previous waypoint."""
+    """Returns the pose of the tool at a waypoint, in its frame; None if it depends on the previous waypoint."""
     return waypoint.pose if waypoint.q is None else arm.forward(waypoint.q)
+
+
+def target_in_base(waypoint: Waypoint, arm: RobotModel) -> Pose | None:
+    """Returns the pose of the tool at a waypoint of a placed draft; None if it is not known."""
+    return None if waypoint.frame is not None else target_of(waypoint, arm)
+
+
+def placed(draft: Draft, cell: Cell | None) -> Draft:
+    """Returns the program with its waypoints in base, the same one for the same arguments.
+
+    A waypoint whose frame the cell does not have stays in its frame.
+    """
+    return draft if cell is None else _placed(draft, cell.model, cell.frames, cell.T_world_base)
+
+
+@lru_cache(maxsize=8)
+def _placed(draft: Draft, model: str, frames: tuple[Frame, ...], T_world_base: Pose) -> Draft:
+    """Returns the program in base; an obstacle that moves changes none of the arguments."""
+    if all(step.waypoint.frame is None for step in draft.steps):
+        return draft
+    poses = Cell(model=model, frames=frames, T_world_base=T_world_base).frame_poses
+    return replace(draft, steps=tuple(Step(step.key, _in_base(step.waypoint, poses)) for step in draft.steps))
+
+
+def _in_base(waypoint: Waypoint, poses: dict[str, Pose]) -> Waypoint:
+    if waypoint.frame not in poses:
+        return waypoint
+    try:
+        return waypoint.in_base(poses[waypoint.frame])
+    except InvalidValueError:  # Too far away, which planning reports.
+        return waypoint
 
 
 def is_led_in(plan: Plan) -> bool:

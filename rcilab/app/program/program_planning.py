@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from rcilab.app.planning import Plan, build_plan_view
@@ -12,6 +13,7 @@ from rcilab.control_process.layout import MOTION_ROWS
 from rcilab.core.arrays import JointVector
 from rcilab.core.background_job import ProgressCallback
 from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion import plan_program
 from rcilab.motion.joint import JointLaw
@@ -30,7 +32,9 @@ class Job:
     model: RobotModel
     draft: Draft
     program: Program
-    """The draft, or its first part."""
+    """The draft, or its first part, in base."""
+    frames: Mapping[str, Pose]
+    """Pose in base of each frame that waypoints of the draft are in."""
     here: JointVector
     """The arm's position, [rad]."""
     rounds: int
@@ -53,6 +57,6 @@ def plan_job(job: Job, progress: ProgressCallback) -> Plan:
     )
     progress(_MOTION)
     report = check(motion, job.model, start=job.here, box=job.box, distance=None)
-    plan = replace(build_plan_view(job.model, motion, report, job.box), program=job.program)
+    plan = replace(build_plan_view(job.model, motion, report, job.box), program=job.program, frames=job.frames)
     progress(_CHECKED)
     return plan.completed(cell=job.cell)

@@ -10,7 +10,7 @@ import numpy as np
 
 from rcilab.app.goal.goal import POSE_FIELDS
 from rcilab.app.goal.goal_actions import FURTHEST
-from rcilab.app.program.program_draft import Draft, target_of
+from rcilab.app.program.program_draft import Draft, target_in_base, target_of
 from rcilab.core.arrays import Array
 from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose
@@ -107,12 +107,18 @@ def arm_angle_of(waypoint: Waypoint, arm: RobotModel) -> float | None:
 
 
 def default_via(draft: Draft, key: int, arm: RobotModel) -> Array | None:
-    """Returns a point next to the straight line to a step, for an arc over it, [m]; None if there is no line."""
+    """Returns a point next to the straight line to a step, for an arc over it, [m]; None if there is no line.
+
+    Args:
+        draft: The program, placed in base.
+        key: Key of the step.
+        arm: The arm with the program's tool.
+    """
     index = draft.index(key)
     if index is None or draft.start is None:
         return None
-    goal = target_of(draft.steps[index].waypoint, arm)
-    start = target_of(draft.steps[index - 1].waypoint, arm) if index else arm.forward(draft.start)
+    goal = target_in_base(draft.steps[index].waypoint, arm)
+    start = target_in_base(draft.steps[index - 1].waypoint, arm) if index else arm.forward(draft.start)
     if goal is None or start is None:
         return None
     way = goal.position - start.position

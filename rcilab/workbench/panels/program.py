@@ -10,7 +10,7 @@ import numpy as np
 
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import CancelProgram, PlanProgram
-from rcilab.app.program.program_draft import Draft, Note, ProgramState, describe_place, number_at
+from rcilab.app.program.program_draft import Draft, Note, ProgramState, describe_place, number_at, placed
 from rcilab.app.program.waypoint_fields import WAYPOINT_FIELDS
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import time_shown
@@ -85,10 +85,11 @@ class ProgramPanel:
         plan = state.plan if state.plan is not None and program.planned is draft and state.plan.program else None
         t = time_shown(state, status)
         running = None if plan is None else number_at(plan, t)
-        drawn = (draft, program.selected, program.failed, program.notes, running, state.model)
+        in_base = placed(draft, state.cell.cell)
+        drawn = (in_base, program.selected, program.failed, program.notes, running, state.model)
         if drawn != self._drawn:  # The positions of waypoints take some time to compute.
             self._drawn = drawn
-            self._list.show(list_html(state, draft, running, text))
+            self._list.show(list_html(state, in_base, running, text))
         index, count = draft.index(program.selected), len(draft.steps)
         able = {
             "up": index is not None and index > 0, "down": index is not None and index < count - 1,

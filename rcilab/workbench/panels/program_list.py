@@ -6,7 +6,7 @@ import math
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from rcilab.app.program.program_draft import Draft, Note, target_of
+from rcilab.app.program.program_draft import Draft, Note, target_in_base
 from rcilab.app.program.waypoint_fields import arm_angle_of
 from rcilab.app.text import Text
 from rcilab.core.errors import RcilabError
@@ -27,7 +27,7 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
 
     Args:
         state: State of the page.
-        draft: The program.
+        draft: The program, placed in base.
         running: Number of the waypoint that the preview moves to, 0 during the approach to the start.
         text: The catalogue.
     """
@@ -45,6 +45,8 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
         chosen, failed = step.key == state.program.selected, step.key == state.program.failed
         look = (" rl-failed" if failed else "") + (" rl-running" if number == running else "")
         sign = f'<em title="{esc(text("program.failed"))}">!</em>' if failed else ""
+        if step.waypoint.frame is not None:
+            sign = f'<em title="{esc(text("program.frame_missing", frame=step.waypoint.frame))}">!</em>'
         if step.key in noted:
             sign += f'<i title="{noted[step.key]}">{_NOTED}</i>'
         cells = (f"{number}{sign}", *_cells(step.waypoint, arm, text))
@@ -113,8 +115,10 @@ def _cells(waypoint: Waypoint, arm: RobotModel, text: Text) -> tuple[str, ...]:
 
 
 def _where(waypoint: Waypoint, arm: RobotModel, text: Text) -> str:
+    if waypoint.frame is not None:
+        return "?"
     try:
-        target = target_of(waypoint, arm)
+        target = target_in_base(waypoint, arm)
     except RcilabError:
         return "?"
     if target is not None:

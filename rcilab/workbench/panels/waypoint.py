@@ -39,6 +39,10 @@ class WaypointPanel:
             self._kinds = {kind: label for label, kind in kinds.items()}
             choice = gui.add_dropdown(text("program.type"), tuple(kinds), hint=text("program.type_hint"))
             self._kind = BoundControl(choice, ask, lambda v, p: EditProgram(page=p, what="type", type=kinds.get(v, "")))
+            choice = gui.add_dropdown(
+                text("jog.frame"), (text("jog.frame.base"),), hint=text("program.frame_hint"), visible=False
+            )
+            self._frame = BoundControl(choice, ask, self._ask_frame)
             for name in (*_PLAIN, *(("psi",) if state.model.redundancy else ())):
                 self._field(gui, name)
         self._pose = gui.add_folder(text("program.pose"))
@@ -78,10 +82,12 @@ class WaypointPanel:
         self._folder.label = self._text("program.selected", number=index + 1)
         self._pose.visible, self._via.visible = "x" in values, waypoint.type == "arc"
         self._show_kind(waypoint)
+        frames = () if state.cell.cell is None else tuple(state.cell.cell.frame_poses)
+        self._show_frame(waypoint, frames)
         for name, field in self._fields.items():
             field.field = f"program.{key}.{name}"
             field.show(values.get(name, ""), state.problems.get(field.field), state.entered)
-        self._source.show(self._note(waypoint))
+        self._source.show(self._note(waypoint, frames))
 
     def _show_kind(self, waypoint: Waypoint) -> None:
         """Shows the type; a type that only files have is the only option."""
@@ -92,6 +98,20 @@ class WaypointPanel:
             self._kind.exchange(options, label)
         box.disabled = not is_free
         self._kind.show(label)
+
+    def _show_frame(self, waypoint: Waypoint, frames: tuple[str, ...]) -> None:
+        """Shows the frame of a waypoint, where there is a choice; also one that the cell does not have."""
+        base, box = self._text("jog.frame.base"), self._frame.handle
+        label = base if waypoint.frame is None else waypoint.frame
+        options = tuple(dict.fromkeys((base, *frames[1:], label)))  # The first one is the world.
+        if box.options != options:
+            self._frame.exchange(options, label)
+        box.visible = len(options) > 1 and waypoint.type != "nullspace"
+        self._frame.show(label)
+
+    def _ask_frame(self, label: str, page: int | None) -> EditProgram:
+        is_base = label == self._text("jog.frame.base")
+        return EditProgram(page=page, what="frame", frame=None if is_base else label)
 
     def _field(self, gui: Any, name: str) -> None:
         box = gui.add_text(self._text(f"program.field.{name}"), "", hint=self._text(f"program.hint.{_hint_of(name)}"))
@@ -106,10 +126,11 @@ class WaypointPanel:
         button = gui.add_button(name, icon=icon, color="gray", hint=self._text(f"program.{what}_{source}_hint"))
         on_press(button, self._ask, lambda page: EditProgram(page=page, what=what, source=source))
 
-    def _note(self, waypoint: Waypoint) -> str:
-        if waypoint.type in TYPES:
-            return ""
-        return f'<p class="rl-note">{esc(self._text("program.from_file"))}</p>'
+    def _note(self, waypoint: Waypoint, frames: tuple[str, ...]) -> str:
+        notes = [] if waypoint.type in TYPES else [self._text("program.from_file")]
+        if waypoint.frame not in (None, *frames):
+            notes.append(self._text("program.frame_missing", frame=waypoint.frame))
+        return "".join(f'<p class="rl-note">{esc(note)}</p>' for note in notes)
 
 
 def _values(waypoint: Waypoint, arm: RobotModel) -> dict[str, str]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app.program.program_draft import target_of
+from rcilab.app.program.program_draft import placed, target_in_base
 from rcilab.core.arrays import Array
 from rcilab.core.errors import RcilabError
 
@@ -39,21 +39,22 @@ class ProgramMarks:
     def show(self, state: UiState) -> None:
         """Draws what has changed."""
         program = state.program
-        drawn = (program.draft, program.selected, program.failed, state.model)
+        draft = placed(program.draft, state.cell.cell)
+        drawn = (draft, program.selected, program.failed, state.model)
         if drawn == self._drawn:
             return
         self._drawn = drawn
         for handle in self._handles:
             handle.remove()
         self._handles = []
-        if program.draft.model != state.model.name:
+        if draft.model != state.model.name:
             return
         points: list[Array] = []
         colors, numbers = [], []
-        arm = program.draft.arm(state.model)
-        for number, step in enumerate(program.draft.steps, start=1):
+        arm = draft.arm(state.model)
+        for number, step in enumerate(draft.steps, start=1):
             try:
-                target = target_of(step.waypoint, arm)
+                target = target_in_base(step.waypoint, arm)
             except RcilabError:
                 continue
             if target is None:
