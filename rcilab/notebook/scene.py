@@ -136,7 +136,7 @@ class _LivePicture:
         self._ghost_color = _REACHED
         self._path: Plan | None = None
         self._cell = CellView(canvas)
-        self._drawn: tuple[Cell | None, Pose | None] = (None, None)
+        self._drawn: tuple[Cell | None, Pose] = (None, model.T_flange_tool)  # Without a cell, nothing is to be drawn.
         self._draw_cell()
 
     def draw(self) -> None:
