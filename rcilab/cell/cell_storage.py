@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+import zlib
 from collections.abc import Callable
 from io import BytesIO
 from os import PathLike, fspath, path
@@ -10,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, TypeVar
 
 from rcilab.cell.cell_file import cell_text, read_cell
-from rcilab.cell.mesh_file import LARGEST_FILE, load_mesh, mesh_stl, read_mesh
+from rcilab.cell.mesh_file import load_mesh, mesh_stl, read_mesh
 from rcilab.cell.shapes import MeshShape
 from rcilab.core.arrays import described
 from rcilab.core.atomic_file import read_limited, replacing
@@ -92,27 +93,31 @@ def unpack_cell(content: bytes, name: str, build: Callable[..., T]) -> T:
         InvalidValueError: It is not an archive of a cell, or the cell is not valid.
         VersionMismatchError: The cell has another version of its format.
     """
+    entries = _unpack(content, name)
+    if _TEXT not in entries:
+        raise InvalidValueError("cell file", name, f"contains no {_TEXT}; save the cell as .zip again")
+    require_length(len(entries[_TEXT]), _TEXT)
+
+    def find_mesh(file: str, scale: float) -> MeshShape:
+        inside = str(PurePosixPath(file))
+        if inside not in entries:
+            raise InvalidValueError("file", file, f"is not in {name}; save the cell as .zip again")
+        return read_mesh(entries[inside], inside, scale=scale)
+
+    return read_cell(entries[_TEXT], f"{name}, {_TEXT}", find_mesh, build)
+
+
+def _unpack(content: bytes, name: str) -> dict[str, bytes]:
+    """Returns the files in a ZIP archive."""
     try:
         with zipfile.ZipFile(BytesIO(content)) as archive:
-            entries = {entry.filename: entry for entry in archive.infolist()}
-            _require_archive(sum(entry.file_size for entry in entries.values()))
-            if _TEXT not in entries:
-                raise InvalidValueError("cell file", name, f"contains no {_TEXT}; save the cell as .zip again")
-
-            def read(entry: str) -> bytes:
-                found = archive.open(entries[entry]).read(LARGEST_FILE + 1)
-                require_length(len(found), entry) if entry == _TEXT else None
-                return found
-
-            def find_mesh(file: str, scale: float) -> MeshShape:
-                inside = str(PurePosixPath(file))
-                if inside not in entries:
-                    raise InvalidValueError("file", file, f"is not in {name}; save the cell as .zip again")
-                return read_mesh(read(inside), inside, scale=scale)
-
-            return read_cell(read(_TEXT), f"{name}, {_TEXT}", find_mesh, build)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError) as error:
-        # RuntimeError: a password is needed; NotImplementedError: an unknown compression.
+            infos = archive.infolist()
+            _require_archive(sum(info.file_size for info in infos))
+            return {info.filename: archive.read(info) for info in infos}
+    except InvalidValueError:
+        raise
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError, ValueError) as error:
+        # RuntimeError: a password is needed; NotImplementedError: an unknown compression; ValueError: a wrong offset.
         raise InvalidValueError("cell file", name, f"is not a ZIP archive that can be read: {error}") from error
 
 

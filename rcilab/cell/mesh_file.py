@@ -14,7 +14,7 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.robots.mesh import Mesh, encode_stl
 
 ENDINGS = (".stl", ".obj", ".glb", ".gltf", ".ply")
-LARGEST_FILE = 50_000_000  # [bytes] 200 000 triangles as text have 40 million.
+_LARGEST_FILE = 50_000_000  # [bytes] 200 000 triangles as text have 40 million.
 
 
 def load_mesh(file: str | PathLike[str], *, scale: float = 1.0) -> MeshShape:
@@ -70,8 +70,8 @@ def require_ending(name: str) -> None:
 
 
 def _require_size(size: int, name: str) -> None:
-    if size > LARGEST_FILE:
-        raise InvalidValueError("file", name, f"has {size / 1e6:.0f} MB, a mesh at most {LARGEST_FILE / 1e6:g}")
+    if size > _LARGEST_FILE:
+        raise InvalidValueError("file", name, f"has {size / 1e6:.0f} MB, a mesh at most {_LARGEST_FILE / 1e6:g}")
 
 
 def _read(source: Path | BytesIO, name: str, scale: float, file: str) -> MeshShape:

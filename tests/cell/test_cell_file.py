@@ -154,6 +154,17 @@ def test_a_wrong_archive_is_refused(content: bytes, said: str) -> None:
         read_uploaded(content, "cell.zip", Cell)
 
 
+def test_a_damaged_archive_is_refused(folder: Path) -> None:
+    whole_cell(folder).save(folder / "cell.zip")
+    content = bytearray((folder / "cell.zip").read_bytes())
+    for place in range(0, len(content), 7):
+        damaged = bytes(content[:place]) + b"\xff" * 5 + bytes(content[place + 5 :])
+        try:
+            read_uploaded(damaged, "cell.zip", Cell)
+        except (InvalidValueError, VersionMismatchError):
+            continue
+
+
 @pytest.fixture(scope="module")
 def schema():
     import jsonschema  # Takes 2 s, which other workers need not wait for.
