@@ -132,8 +132,8 @@ class Dispatcher:
         """Failures of our own code; at most one a second is printed and shown on the page."""
         features = (
             self._goal, self._poses, self._scene, self._setup, self._cell, self._jog, self._push, self._program,
-            self._program.editing, self._check, self._learn, self.run, self._target_robot, self._mode, self._world,
-            self._signals, self._view, self._export, self._folder, self._control_lock,
+            self._program.editing, self._program.paths, self._check, self._learn, self.run, self._target_robot,
+            self._mode, self._world, self._signals, self._view, self._export, self._folder, self._control_lock,
         )  # fmt: skip
         self._handlers = {kind: act for feature in features for kind, act in feature.handlers.items()}
         self._handlers |= {
@@ -230,6 +230,7 @@ class Dispatcher:
         self._poses.tick()
         self._folder.tick()
         self._program.tick()
+        self._program.paths.tick()
         self._check.tick()
         self._learn.tick()
         self._scene.tick()
@@ -289,6 +290,8 @@ class Dispatcher:
             self._mode.type_field(request)
         elif request.field.startswith("program."):
             self._program.editing.type_field(request)
+        elif request.field.startswith("path."):
+            self._program.paths.type_field(request)
         else:
             self._goal.type_field(request)
 

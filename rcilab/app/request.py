@@ -38,7 +38,7 @@ class TypeField(Request):
 
     field: str
     """joint.0 ..., pose.x ..., psi, speed, program.KEY.speed ..., setup.PART.NAME (see `setup/setup_fields.py`),
-    cell.INDEX.NAME (see `cell/cell_actions.py`)."""
+    cell.INDEX.NAME (see `cell/cell_actions.py`), path.blend."""
     text: str
 
 

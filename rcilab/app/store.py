@@ -13,6 +13,7 @@ from rcilab.app.check.check_state import CheckState
 from rcilab.app.control_lock import ControlLock
 from rcilab.app.jog.jog_state import JogState
 from rcilab.app.learn.learn_state import LearnState
+from rcilab.app.program.path_state import PathState
 from rcilab.app.program.program_draft import ProgramState
 from rcilab.app.run.active_force import PushState
 from rcilab.app.scene.scene_extras import SceneState
@@ -61,6 +62,7 @@ class UiState(AppState):
     scene: SceneState = field(default_factory=SceneState)
     """Values computed for the scene."""
     program: ProgramState = field(default_factory=ProgramState)
+    paths: PathState = field(default_factory=PathState)
     check: CheckState = field(default_factory=CheckState)
     learn: LearnState = field(default_factory=LearnState)
     folder: RunsFolder = RunsFolder()

@@ -19,7 +19,11 @@ _REQUIREMENTS = frozenset(
         "no_number", "numbers", "target_shape", "not_finite", "no_meaning", "no_target", "second_target",
         "second_angle", "six_axes", "frame_of_angles",
         "no_direction", "one_line", "box_size", "table_cell", "table_columns", "table_titles", "table_twice",
-        "table_order",
+        "table_order", "path_columns", "path_beyond", "path_orientation", "path_titles", "gcode_slash",
+        "gcode_subprogram", "gcode_word", "gcode_axis", "gcode_twice", "gcode_machine", "gcode_compensation",
+        "gcode_cycle", "gcode_feed_mode", "gcode_unknown", "gcode_feed", "gcode_dwell", "gcode_no_motion",
+        "gcode_no_start", "gcode_turns", "gcode_center", "gcode_no_center", "gcode_radius", "gcode_no_circle",
+        "gcode_small",
     }
 )  # fmt: skip
 """Codes of requirements on a value; their messages begin with the name of the value."""

@@ -5,18 +5,23 @@ The script is Python that plans the same motion, prints its report and optionall
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
-from os import PathLike
+from os import PathLike, fspath
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import as_vector, described
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.dynamics.payload import Payload
+from rcilab.motion.joint import DEFAULT_SPEED
+from rcilab.motion.path_import import TOOL_DOWN, load_path
 from rcilab.motion.program_file import load_program, program_text, read_program, save_program
 from rcilab.motion.waypoint import Floats, Waypoint, angles_of, named_value, require_count, require_fit, vector_of
 from rcilab.robots import describe_robot
@@ -196,6 +201,37 @@ class Program:
             VersionMismatchError: It has another version of this format.
         """
         return load_program(file, cls)
+
+    @classmethod
+    def from_path(
+        cls, file: str | PathLike[str], model: RobotModel, *, start: ArrayLike | None = None, frame: str | None = None,
+        wxyz: ArrayLike = TOOL_DOWN, speed: float = DEFAULT_SPEED, blend: float = 0.0,
+    ) -> Program:  # fmt: skip
+        """Returns the program along a path: G-code (.nc, .ngc, .gcode, .tap), or positions in a table (.csv).
+
+        The first waypoint is a joint move to the path, all others are lines, arcs and circles. What is ignored, and
+        feeds that the arm does not have, are warnings. docs/paths.md has the columns and the words.
+
+        Args:
+            file: The file.
+            model: The arm, with its tool. A feed becomes its part of `model.limits.cartesian.translation_velocity`.
+            start: Joint angles at the start of the program, shape (n,), [rad]; None: `model.home`.
+            frame: Name of the work frame that the path is given in; None: base.
+            wxyz: Orientation of the tool in that frame, a unit quaternion, where the file has none. The default is a
+                tool along -z.
+            speed: Part of the limits for moves without a feed.
+            blend: Radius around the corners, up to 1, [m]; less where half of a neighbouring move is shorter.
+
+        Raises:
+            InvalidValueError: The file does not exist, or its path is not valid; the message names the line.
+        """
+        path = load_path(file, model, frame=frame, wxyz=wxyz, speed=speed, blend=blend)
+        for note in path.notes:
+            warnings.warn(note, stacklevel=2)
+        q = model.home if start is None else as_vector(start, model.n, "start", "rad")
+        return cls(
+            model=model.name, start=tuple(q.tolist()), waypoints=path.waypoints, name=Path(fspath(file)).stem
+        )  # fmt: skip
 
     def to_python(self) -> str:
         """Returns a script that plans the same motion; `python SCRIPT [OUT.npz]` prints its report.

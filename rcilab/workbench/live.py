@@ -118,6 +118,12 @@ class Entry(PageMessage):
     index: _Key
 
 
+class Draw(PageMessage):
+    """Enter or Esc was pressed while a path is drawn."""
+
+    what: Literal["end", "cancel"]
+
+
 class Edit(PageMessage):
     """An action in the list of waypoints."""
 
@@ -145,6 +151,7 @@ _DECODER = msgspec.json.Decoder(
     | Branch
     | Condition
     | Entry
+    | Draw
     | Edit
 )
 

@@ -39,6 +39,7 @@ def decorate(index: bytes, quality: str = "full") -> bytes:
         "labels",
         "toolbar",
         "jog_devices",
+        "draw",
     )
     script = b"\n".join((assets / f"{name}.js").read_bytes() for name in scripts)
     head = b"<style>" + style + b"</style><script>" + script + b"</script></head>"

@@ -32,6 +32,7 @@ from rcilab.workbench.panels.learn import LearnPanel
 from rcilab.workbench.panels.learn_demo import LearnDemoPanel
 from rcilab.workbench.panels.learn_lesson import LearnLessonPanel
 from rcilab.workbench.panels.mode import ModePanel
+from rcilab.workbench.panels.path import PathPanel
 from rcilab.workbench.panels.path_type import PathTypePanel
 from rcilab.workbench.panels.poses import PosesPanel
 from rcilab.workbench.panels.program import ProgramPanel
@@ -69,7 +70,7 @@ _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, ArmStatePanel, PosesPanel),
     ("tab.target", "current-location", TargetPanel, ElbowPanel, BranchesPanel, PathTypePanel),
-    ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel),
+    ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel, PathPanel),
     ("tab.setup", "tool", SetupPanel, SetupNumbersPanel, SoftLimitsPanel),
     ("tab.cell", "box", CellPanel, CellEntryPanel, CellRestPanel, CellFilePanel),
     ("tab.check", "clipboard-check", CheckPanel),
@@ -188,7 +189,11 @@ class Renderer:
         if is_whole:
             self._show_panels(state, seen, status)
         first = _RUN if state.watched else 0  # The tab of a page that opens.
-        self._live.publish(**status_values(seen, status, self._text, self._timeline.end), tab=first)
+        self._live.publish(
+            **status_values(seen, status, self._text, self._timeline.end),
+            tab=first,
+            drawing=state.paths.drawing is not None,
+        )
         return is_whole
 
     def _can_wait(self, state: UiState, status: SupervisorStatus) -> bool:

@@ -120,3 +120,31 @@ def test_a_waypoint_is_expressed_in_a_frame_of_the_cell(writing):
     page.bench.dispatcher.ask(EditCell(what="clear"))
     page.tab.get_by_text("The cell has no frame Frame").first.wait_for(state="visible")
     page.wait(lambda: field(page, "Frame").input_value() == "Frame", "the missing frame")
+
+
+def test_a_path_is_imported_and_another_one_drawn_by_clicks_on_the_floor(writing, tmp_path):
+    page, steps = writing, lambda: writing.state.program.draft.steps
+    file = tmp_path / "square.nc"
+    file.write_text("G0 X450 Y-50 Z400\nG1 X550 F1200\nY50\nX450\nY-50\n")
+    with page.tab.expect_file_chooser() as choosing:
+        page.button("Import path").click()
+    choosing.value.set_files(file)
+    page.wait(lambda: len(steps()) == 5, "the imported path")
+    page.wait(lambda: page.tab.get_by_role("option").count() == 5, "its rows")
+    page.button("Draw path").click()
+    page.wait(lambda: page.state.paths.drawing == (), "the drawing")
+    page.button("End the path").wait_for(state="visible")
+    floor = np.array(((0.5, -0.3, 0.0), (0.6, -0.35, 0.0)))
+    for number, place in enumerate(floor, 1):
+        page.tab.mouse.click(*page.project("/live", tuple(place.tolist())))
+        page.wait(lambda number=number: len(page.state.paths.drawing) == number, "a point where it was clicked")
+    found = np.array([point.position for point in page.state.paths.drawing])
+    assert np.abs(found - floor).max() < 0.02
+    page.tab.keyboard.press("Enter")
+    page.wait(lambda: len(steps()) == 7, "the drawn lines")
+    assert steps()[-1].waypoint.type == "line"
+    page.button("Draw path").click()
+    page.tab.locator("html[data-rl-drawing]").wait_for()
+    page.tab.keyboard.press("Escape")
+    page.wait(lambda: page.state.paths.drawing is None, "no drawing")
+    assert len(steps()) == 7

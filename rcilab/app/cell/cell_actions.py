@@ -199,7 +199,9 @@ class CellActions:
             self._turn_back(request.what)
 
     def select(self, request: SelectEntry) -> None:
-        """Selects an entry, whose handles the scene then shows."""
+        """Selects an entry, whose handles the scene then shows; not while clicks draw a path."""
+        if self._store.state.paths.drawing is not None:
+            return
         entries = entries_of(self._store.state.cell.cell)
         known = request.index is not None and 0 <= request.index < len(entries)
         self._set(selected=entries[request.index] if known and request.index is not None else None)

@@ -12,6 +12,7 @@ from rcilab.app.connection import PageConnection
 from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.planning import Plan
 from rcilab.app.program.edit_actions import LONGEST_NAME, EditActions
+from rcilab.app.program.path_actions import PathActions
 from rcilab.app.program.program_draft import FILE_FIELD, Draft, draft_of, is_led_in, notes_of, number_at, placed
 from rcilab.app.program.program_history import ProgramHistory
 from rcilab.app.program.program_planning import Job, plan_job
@@ -54,6 +55,7 @@ class ProgramActions:
 
     Attributes:
         editing: The edits of the program.
+        paths: Paths that become waypoints.
     """
 
     def __init__(self, store: Store, connection: PageConnection, goal: GoalActions) -> None:
@@ -63,6 +65,7 @@ class ProgramActions:
         self._basis: tuple[RobotModel, SafetyBox | None, Draft] | None = None
         self._history = ProgramHistory(store, self._drop_planning)
         self.editing = EditActions(store, connection, goal, self._history)
+        self.paths = PathActions(store, connection, self._history)
 
     @property
     def handlers(self) -> Handlers:

@@ -21,6 +21,7 @@ from rcilab.workbench.scene.drag_handle import DragHandle
 from rcilab.workbench.scene.elbow_view import ElbowSceneView
 from rcilab.workbench.scene.extras_view import ExtrasView
 from rcilab.workbench.scene.goal_view import GoalView
+from rcilab.workbench.scene.path_drawing_view import PathDrawingView
 from rcilab.workbench.scene.path_strip_view import PathStripView
 from rcilab.workbench.scene.watchers import Watchers
 from rcilab.workbench.widgets import Ask
@@ -93,6 +94,7 @@ class Stage:
         self._grip.show(state, status, text)
         self._setup.show(state, text)
         self._cell.show(state, text)
+        self._drawn_path.show(state)
         self._show_carried(state)
         self._watchers.show(
             state.control_lock, self._goal.handles + self._elbow.handles + self._setup.handles + self._cell.handles
@@ -103,6 +105,7 @@ class Stage:
         if self._built is not None:
             self._setup.remove()
             self._cell.remove()
+            self._drawn_path.remove()
             for part in (self._goal, self._elbow, self._ribbon, self._extras, self._grip, self._live):
                 part.remove()
             for ghost in self._ghosts.values():
@@ -116,6 +119,7 @@ class Stage:
         self._grip = DragHandle(server, drawing, self._live, self._ask)
         self._setup = ConfigurationSceneView(server, drawing, self._live, self._ask)
         self._cell = CellSceneView(server, drawing, self._ask)
+        self._drawn_path = PathDrawingView(server, drawing, self._ask)
         self._carried: Mesh | None = None
         self._carried_of: tuple[object, object] = (None, None)
         self._goal = GoalView(server, state, self._ask)
