@@ -95,7 +95,8 @@ class StreamFilter:
         self._since = 0
         self._start = self._output
         self._before, self._target = self._target, list(q)
-        self._curve.take(self._target)
+        if self.mode == "fit":
+            self._curve.take(self._target)
 
     def step(self) -> list[float]:
         """Returns the angles to follow in this cycle, n plain floats, [rad]."""
