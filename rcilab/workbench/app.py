@@ -20,7 +20,7 @@ from rcilab.app.control_lock_actions import AnswerControls, PageClosed, PageOpen
 from rcilab.app.dispatcher import Dispatcher
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import ChooseBranch
-from rcilab.app.program.edit_actions import EditProgram
+from rcilab.app.program.edit_actions import EditProgram, ShowRows
 from rcilab.app.program.path_actions import DrawPath
 from rcilab.app.request import Request
 from rcilab.app.robot_connection import RobotConnection
@@ -241,6 +241,8 @@ class Workbench:
                 return ShowExtra(page=page, name=name, on=on)
             case live.Entry(index):
                 return SelectEntry(page=page, index=index)
+            case live.Rows(index):
+                return ShowRows(page=page, index=index)
             case live.Draw(what):
                 return DrawPath(page=page, what=what)
             case live.Edit(what, key, index):

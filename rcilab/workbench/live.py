@@ -118,6 +118,13 @@ class Entry(PageMessage):
     index: _Key
 
 
+class Rows(PageMessage):
+    """The list of waypoints was scrolled to rows that it does not have."""
+
+    index: _Key
+    """Index of the row in the middle, from 0."""
+
+
 class Draw(PageMessage):
     """Enter or Esc was pressed while a path is drawn."""
 
@@ -151,6 +158,7 @@ _DECODER = msgspec.json.Decoder(
     | Branch
     | Condition
     | Entry
+    | Rows
     | Draw
     | Edit
 )

@@ -148,3 +148,35 @@ def test_a_path_is_imported_and_another_one_drawn_by_clicks_on_the_floor(writing
     page.tab.keyboard.press("Escape")
     page.wait(lambda: page.state.paths.drawing is None, "no drawing")
     assert len(steps()) == 7
+
+
+def test_a_long_program_is_scrolled_and_walked_through_by_keys(writing):
+    page, count = writing, 600
+    waypoints = [Waypoint.joint(page.state.model.home, speed=0.001 * (1 + number)) for number in range(count)]
+    program = Program(model=page.state.model.name, start=page.state.model.home, waypoints=tuple(waypoints))
+    page.bench.dispatcher.ask(LoadProgram(name="long.json", content=program.to_json().encode()))
+    page.wait(lambda: len(page.state.program.draft.steps) == count, "the program")
+    rows = page.tab.locator(".rl-steps")
+    keys = [step.key for step in page.state.program.draft.steps]
+
+    def sees(number: int) -> bool:
+        row = page.tab.locator(f"#rl-step-{keys[number - 1]}")
+        if not row.count():
+            return False
+        inner, outer = row.bounding_box(), rows.bounding_box()
+        return inner is not None and outer["y"] - 1 <= inner["y"] <= outer["y"] + outer["height"]
+
+    page.wait(lambda: sees(1), "the first row")
+    assert page.tab.get_by_role("option").count() < 200
+    rows.evaluate("(list) => { list.scrollTop = 25 * 300; }")
+    page.wait(lambda: sees(305), "the rows that were scrolled to")
+    page.tab.locator(f"#rl-step-{keys[304]}").click()
+    page.wait(lambda: page.state.program.selected == keys[304], "the clicked row")
+    page.tab.keyboard.press("ArrowDown")
+    page.wait(lambda: page.state.program.selected == keys[305] and sees(306), "the row below")
+    page.tab.keyboard.press("End")
+    page.wait(lambda: page.state.program.selected == keys[-1] and sees(count), "the last row")
+    page.tab.keyboard.press("ArrowUp")
+    page.wait(lambda: page.state.program.selected == keys[-2], "the row above")
+    page.tab.keyboard.press("Home")
+    page.wait(lambda: page.state.program.selected == keys[0] and sees(1), "the first row again")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 from rcilab.app.connection import PageConnection
 from rcilab.app.goal.goal_actions import GoalActions
@@ -43,6 +43,20 @@ class EditProgram(Request):
     """New index of a step, from 0."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShowRows(Request):
+    """The list was scrolled to rows that it did not have."""
+
+    is_silent: ClassVar[bool] = True
+
+    index: int
+    """Index of the row in the middle, from 0."""
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return f"ShowRows.{self.page}"
+
+
 class EditActions:
     """Edits, each of which can be undone.
 
@@ -67,6 +81,7 @@ class EditActions:
         """The handlers of its requests."""
         return {
             EditProgram: self.edit,
+            ShowRows: self.show_rows,
         }
 
     def edit(self, request: EditProgram) -> None:
@@ -87,6 +102,10 @@ class EditActions:
             self._store.notify("warn", message("program.select"))
             return
         self._edits[request.what](request, key)
+
+    def show_rows(self, request: ShowRows) -> None:
+        """Shows other rows of a long program."""
+        self._history.set(scrolled=min(max(request.index, 0), max(len(self._draft.steps) - 1, 0)))
 
     def type_field(self, request: TypeField) -> None:
         """Takes a typed value of a step, the rounds or the name, or shows the problem next to its field."""
@@ -200,7 +219,7 @@ class EditActions:
         """Selects a step; if the plan is that of the program, the preview moves there."""
         if key != self._history.state.selected:
             self._store.clear_problems("program.")
-        self._history.set(selected=key)
+        self._history.set(selected=key, scrolled=None)
         state, index = self._store.state, self._draft.index(key)
         plan = state.plan
         if plan is None or plan.program is None or index is None or self._history.state.planned is not self._draft:

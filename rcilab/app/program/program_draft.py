@@ -155,6 +155,8 @@ class ProgramState:
     draft: Draft = field(default_factory=Draft)
     selected: int | None = None
     """Key of a step."""
+    scrolled: int | None = None
+    """Index of the step to which the list was scrolled; None: the selected step is in sight."""
     can_undo: bool = False
     can_redo: bool = False
     rounds: int = 1

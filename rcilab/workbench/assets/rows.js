@@ -3,7 +3,8 @@
 (() => {
   "use strict";
   const LATE = 1500;  // [ms] A choice: for so long the list may still come as it was before the last choice.
-  let had = false, dragged = null, picked = null, since = 0;
+  const ROW = 25, PAUSE = 60;  // [px] Height of a row; [ms] A choice: between two requests for other rows.
+  let had = false, dragged = null, picked = null, since = 0, revealed = null, top = 0, scrolling = 0;
 
   const listOf = (node) => node instanceof Element ? node.closest(".rl-steps") : null;
   const rows = (list) => [...list.querySelectorAll("[data-key]")];
@@ -29,7 +30,8 @@
   const mark = (list, row) => {
     rows(list).forEach((other) => other.setAttribute("aria-selected", other === row ? "true" : "false"));
     list.setAttribute("aria-activedescendant", row.id);
-    reveal(row);
+    if (row.dataset.key !== revealed) reveal(row);
+    revealed = row.dataset.key;
   };
 
   const reveal = (row) => {
@@ -55,17 +57,18 @@
     const lost = had && event.target === document.body;  // The list has just been exchanged.
     const list = lost ? document.querySelector(".rl-steps") : listOf(event.target);
     if (!list) return;
-    const at = chosen(list), row = rows(list)[at], key = row ? row.dataset.key : 0, control = event.ctrlKey || event.metaKey;
+    const at = chosen(list), row = rows(list)[at], key = row ? row.dataset.key : list.dataset.selected, control = event.ctrlKey || event.metaKey;
     const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     if (event.altKey && (name === "ArrowUp" || name === "ArrowDown")) say(name === "ArrowUp" ? "up" : "down", key);
     else if (control && name === "z") say(event.shiftKey ? "redo" : "undo", 0);
     else if (control && name === "y") say("redo", 0);
     else if (control && name === "d") say("duplicate", key);
     else if (control || event.altKey) return;
+    else if (at < 0 && ["ArrowUp", "ArrowDown"].includes(name)) say("select", list.dataset.selected);  // It was scrolled away.
     else if (name === "ArrowUp") choose(list, at - 1);
     else if (name === "ArrowDown") choose(list, at + 1);
-    else if (name === "Home") choose(list, 0);
-    else if (name === "End") choose(list, Infinity);
+    else if (name === "Home") say("select", list.dataset.first);
+    else if (name === "End") say("select", list.dataset.last);
     else if (name === "Delete") say("delete", key);
     else return;
     event.preventDefault();
@@ -76,15 +79,33 @@
   document.addEventListener("focusin", (event) => { had = listOf(event.target) !== null; });
   document.addEventListener("pointerdown", (event) => { if (!listOf(event.target)) had = false; }, true);
   let seen = null;
-  setInterval(() => {
+  new MutationObserver(() => {
     const list = document.querySelector(".rl-steps");
     if (list === seen) return;
     seen = list;
     if (!list) return;
-    if (had && document.activeElement === document.body) list.focus();
+    list.scrollTop = top;
+    if (had && document.activeElement === document.body) list.focus({ preventScroll: true });
     const row = rows(list)[chosen(list)];
     if (row) mark(list, row);
-  }, 60);
+  }).observe(document.documentElement, { childList: true, subtree: true });
+
+  // A long program has only some of its rows here: those that are scrolled to are asked for.
+  document.addEventListener("scroll", (event) => {
+    const list = listOf(event.target);
+    if (!list || list !== event.target) return;
+    top = list.scrollTop;
+    if (scrolling || !list.querySelector(".rl-steps-room")) return;
+    scrolling = setTimeout(() => {
+      scrolling = 0;
+      if (!list.isConnected) return;
+      const all = rows(list), first = Math.floor(list.scrollTop / ROW) - 1, last = first + Math.ceil(list.clientHeight / ROW);
+      const has = (index) => Number(all[0].dataset.index) <= index && index <= Number(all[all.length - 1].dataset.index);
+      const count = Number(all[0].getAttribute("aria-setsize"));
+      if (has(Math.max(first, 0)) && has(Math.min(last, count - 1))) return;
+      window.dispatchEvent(new CustomEvent("rl-say", { detail: { kind: "rows", index: Math.max(0, Math.round((first + last) / 2)) } }));
+    }, PAUSE);
+  }, true);
 
   const clear = () => document.querySelectorAll(".rl-over").forEach((row) => row.classList.remove("rl-over"));
   document.addEventListener("dragstart", (event) => {

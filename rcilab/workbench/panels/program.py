@@ -17,7 +17,7 @@ from rcilab.app.run.readiness import time_shown
 from rcilab.app.text import Text
 from rcilab.app.view_actions import SetView
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.panels.program_list import list_html, notes_html
+from rcilab.workbench.panels.program_list import list_html, notes_html, window_around
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press
 
@@ -41,6 +41,7 @@ class ProgramPanel:
         self._drawn: tuple[object, ...] = ()
         self._noted: tuple[Note, ...] = ()
         self._began = 0.0
+        self._window = range(0)
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
@@ -86,11 +87,13 @@ class ProgramPanel:
         t = time_shown(state, status)
         running = None if plan is None else number_at(plan, t)
         in_base = placed(draft, state.cell.cell)
-        drawn = (in_base, program.selected, program.failed, program.notes, running, state.model)
+        index, count = draft.index(program.selected), len(draft.steps)
+        wanted = index if program.scrolled is None else program.scrolled
+        self._window = window_around(self._window, count, wanted)
+        drawn = (in_base, program.selected, program.failed, program.notes, running, state.model, self._window)
         if drawn != self._drawn:  # The positions of waypoints take some time to compute.
             self._drawn = drawn
-            self._list.show(list_html(state, in_base, running, text))
-        index, count = draft.index(program.selected), len(draft.steps)
+            self._list.show(list_html(state, in_base, running, text, self._window))
         able = {
             "up": index is not None and index > 0, "down": index is not None and index < count - 1,
             "duplicate": index is not None, "delete": index is not None, "undo": program.can_undo,

@@ -18,11 +18,29 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.model.robot_model import RobotModel
 
+LONGEST_WINDOW = 120
+"""Rows that the page gets of a longer program; tuning value: some screens of them, so that scrolling seldom waits."""
+_MARGIN = 30  # Rows around the wanted one that are there, too.
 _NOTED = "*"
 _HEADS = ("number", "type", "place", "speed", "blend", "psi", "dwell")
 
 
-def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> str:
+def window_around(window: range, count: int, wanted: int | None) -> range:
+    """Returns the rows that the page gets: those of before, as long as the wanted one is well inside.
+
+    Args:
+        window: Rows that the page has, from 0.
+        count: Number of steps.
+        wanted: The row to see, from 0; None: any.
+    """
+    size = min(count, LONGEST_WINDOW)
+    first = min(window.start, count - size)
+    if wanted is not None and not first + _MARGIN <= wanted < first + size - _MARGIN:
+        first = min(max(wanted - size // 2, 0), count - size)
+    return range(first, first + size)
+
+
+def list_html(state: UiState, draft: Draft, running: int | None, text: Text, window: range | None = None) -> str:
     """Returns the list.
 
     Args:
@@ -30,6 +48,7 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
         draft: The program, placed in base.
         running: Number of the waypoint that the preview moves to, 0 during the approach to the start.
         text: The catalogue.
+        window: The steps to list, from 0; None: all. The others are an empty room of their height.
     """
     if not draft.steps or draft.start is None:
         return f'<div class="rl-steps-none"><b>{esc(text("program.none"))}</b>{esc(text("program.none_long"))}</div>'
@@ -40,8 +59,11 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
     )
     notes = state.program.notes
     noted = {note.key: sentence for note, sentence in zip(notes, _sentences(notes, text), strict=True)}
-    rows = [_start_row(draft, arm, running == 0, text)]
-    for number, step in enumerate(draft.steps, start=1):
+    count = len(draft.steps)
+    window = range(count) if window is None else window
+    rows = [_start_row(draft, arm, running == 0, text), _room(window.start)]
+    for number in range(window.start + 1, window.stop + 1):
+        step = draft.steps[number - 1]
         chosen, failed = step.key == state.program.selected, step.key == state.program.failed
         look = (" rl-failed" if failed else "") + (" rl-running" if number == running else "")
         sign = f'<em title="{esc(text("program.failed"))}">!</em>' if failed else ""
@@ -52,13 +74,17 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
         cells = (f"{number}{sign}", *_cells(step.waypoint, arm, text))
         rows.append(
             f'<div class="rl-step{look}" role="option" id="rl-step-{step.key}" data-key="{step.key}" '
-            f'data-index="{number - 1}" aria-selected="{"true" if chosen else "false"}" draggable="true">'
+            f'data-index="{number - 1}" aria-selected="{"true" if chosen else "false"}" draggable="true" '
+            f'aria-posinset="{number}" aria-setsize="{count}">'
             + "".join(f"<span>{cell}</span>" for cell in cells)
             + "</div>"
         )
+    rows.append(_room(count - window.stop))
     return (
         f'<div class="rl-steps-head" aria-hidden="true">{heads}</div><div class="rl-steps" role="listbox" tabindex="0" '
-        f'aria-label="{esc(text("program.list"))}" aria-activedescendant="rl-step-{state.program.selected}">'
+        f'aria-label="{esc(text("program.list"))}" aria-activedescendant="rl-step-{state.program.selected}" '
+        f'data-first="{draft.steps[0].key}" data-last="{draft.steps[-1].key}" '
+        f'data-selected="{state.program.selected or 0}">'
         + "".join(rows)
         + f'</div><p class="rl-note rl-keys">{esc(text("program.keys"))}</p>'
     )
@@ -83,6 +109,11 @@ def notes_html(notes: tuple[Note, ...], text: Text) -> str:
 def _sentences(notes: tuple[Note, ...], text: Text) -> tuple[str, ...]:
     """Returns remarks as HTML, cached: a program may have a thousand, and its rows are redrawn at every step."""
     return tuple(esc(text.render(describe_note(note.remark))) for note in notes)
+
+
+def _room(count: int) -> str:
+    """Returns the room of rows that are not there."""
+    return f'<div class="rl-steps-room" role="presentation" style="--rows:{count}"></div>' if count else ""
 
 
 def _start_row(draft: Draft, arm: RobotModel, running: bool, text: Text) -> str:

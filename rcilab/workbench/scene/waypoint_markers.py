@@ -13,14 +13,16 @@ from rcilab.core.errors import RcilabError
 if TYPE_CHECKING:
     import viser
 
+    from rcilab.app.program.program_draft import Draft
     from rcilab.app.store import UiState
+    from rcilab.model.robot_model import RobotModel
 
 _MOST = 60  # More labels hide the arm, and slow the browser down.
 _NEAR = 0.03  # [m] A tuning value: at the home view, two numbers at a smaller distance overlap.
 _CHARACTER, _LINE = 0.018, 0.05  # [m] Approximate width and height of a character at the home view.
 _RANGES = 2  # A label with more ranges would be wider than its points.
 _PLAIN, _CHOSEN, _FAILED = (70, 110, 160), (11, 111, 194), (209, 57, 43)
-_SIZE = 0.016  # [m]
+_SIZE, _LARGER = 0.016, 0.02  # [m] Of a point, and of one that stands out, which covers it.
 _ABOVE = 0.022  # [m]
 
 
@@ -34,7 +36,10 @@ class ProgramMarks:
     def __init__(self, server: viser.ViserServer) -> None:
         self._scene = server.scene
         self._drawn: tuple[object, ...] = ()
-        self._handles: list[Any] = []
+        self._points: dict[int, tuple[int, Array]] = {}  # Number and position of each waypoint, by key.
+        self._placed: tuple[object, object] = (None, None)
+        self._clouds: list[Any] = []
+        self._labels: list[Any] = []
 
     def show(self, state: UiState) -> None:
         """Draws what has changed."""
@@ -44,45 +49,78 @@ class ProgramMarks:
         if drawn == self._drawn:
             return
         self._drawn = drawn
-        for handle in self._handles:
+        is_moved = self._placed[0] is not draft or self._placed[1] is not state.model
+        if is_moved:
+            self._placed = draft, state.model
+            self._points = _positions(draft, state.model)
+        special = {
+            key: color for key, color in ((program.selected, _CHOSEN), (program.failed, _FAILED)) if key in self._points
+        }
+        self._show_points(special, is_moved)
+        numbers = [
+            (number, f"{number} !" if key == program.failed else f"[{number}]" if key == program.selected else "")
+            for key, (number, _) in self._points.items()
+        ]
+        points = [position for _, position in self._points.values()]
+        self._show_labels([(points[group[0]], sentence) for group, sentence in labels_of(points, numbers)])
+
+    def _show_points(self, special: dict[int | None, tuple[int, int, int]], is_moved: bool) -> None:
+        """Draws all points, which are sent again only when they have moved, and on them those that stand out."""
+        for handle in self._clouds[0 if is_moved else 1 :]:
             handle.remove()
-        self._handles = []
-        if draft.model != state.model.name:
+        del self._clouds[0 if is_moved else 1 :]
+        if not self._points:
             return
-        points: list[Array] = []
-        colors, numbers = [], []
-        arm = draft.arm(state.model)
-        for number, step in enumerate(draft.steps, start=1):
-            try:
-                target = target_in_base(step.waypoint, arm)
-            except RcilabError:
-                continue
-            if target is None:
-                continue
-            failed, chosen = step.key == program.failed, step.key == program.selected
-            points.append(target.position)
-            colors.append(_FAILED if failed else _CHOSEN if chosen else _PLAIN)
-            numbers.append((number, f"{number} !" if failed else f"[{number}]" if chosen else ""))
-        for place, (group, sentence) in enumerate(labels_of(points, numbers)):
-            self._handles.append(self._label(place, sentence, points[group[0]]))
-        if points:
-            self._handles.append(
-                self._scene.add_point_cloud(
-                    "/program/points",
-                    np.array(points, dtype=np.float32),
-                    np.array(colors, dtype=np.uint8),
-                    point_size=_SIZE,
-                    point_shape="circle",
-                    precision="float32",
-                )
+        if not self._clouds:
+            places = np.array([position for _, position in self._points.values()], dtype=np.float32)
+            self._clouds.append(self._cloud("points", places, np.array(_PLAIN, dtype=np.uint8), _SIZE))
+        if special:
+            places = np.array([self._points[key][1] for key in special if key is not None], dtype=np.float32)
+            self._clouds.append(
+                self._cloud("marked", places, np.array(list(special.values()), dtype=np.uint8), _LARGER)
             )
 
-    def _label(self, number: int, sentence: str, position: np.ndarray) -> Any:
-        x, y, z = (float(value) for value in position)
-        return self._scene.add_label(
-            f"/program/{number}", sentence, position=(x, y, z + _ABOVE), anchor="bottom-center", depth_test=False,
-            font_screen_scale=0.8,
-        )  # fmt: skip
+    def _cloud(self, name: str, places: np.ndarray, colors: np.ndarray, size: float) -> Any:
+        return self._scene.add_point_cloud(
+            f"/program/{name}", places, colors, point_size=size, point_shape="circle", precision="float32"
+        )
+
+    def _show_labels(self, wanted: list[tuple[Array, str]]) -> None:
+        """Draws labels; one that stays as it was is not sent again."""
+        for handle in self._labels[len(wanted) :]:
+            handle.remove()
+        del self._labels[len(wanted) :]
+        for place, (position, sentence) in enumerate(wanted):
+            above = (float(position[0]), float(position[1]), float(position[2]) + _ABOVE)
+            if place == len(self._labels):
+                self._labels.append(
+                    self._scene.add_label(
+                        f"/program/{place}", sentence, position=above, anchor="bottom-center", depth_test=False,
+                        font_screen_scale=0.8,
+                    )
+                )  # fmt: skip
+                continue
+            label = self._labels[place]
+            if label.text != sentence:
+                label.text = sentence
+            if np.abs(np.asarray(label.position) - above).max() > 1e-7:
+                label.position = above
+
+
+def _positions(draft: Draft, model: RobotModel) -> dict[int, tuple[int, Array]]:
+    """Returns number and position, [m], of each waypoint whose target is known, by key."""
+    if draft.model != model.name:
+        return {}
+    found: dict[int, tuple[int, Array]] = {}
+    arm = draft.arm(model)
+    for number, step in enumerate(draft.steps, start=1):
+        try:
+            target = target_in_base(step.waypoint, arm)
+        except RcilabError:
+            continue
+        if target is not None:
+            found[step.key] = number, target.position
+    return found
 
 
 def labels_of(points: list[Array], numbers: list[tuple[int, str]]) -> list[tuple[list[int], str]]:
