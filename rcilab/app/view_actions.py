@@ -66,6 +66,8 @@ class Play(Request):
 
     playing: bool | None = None
     """None toggles it."""
+    restart: bool = False
+    """Whether it starts from the beginning."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +125,8 @@ class ViewActions:
         if state.plan is None:
             self._store.notify("warn", message("ready.no_plan"))
         elif playing:
-            self._store.update(playing=True, playhead=0.0 if state.playhead >= 1.0 else state.playhead)
+            playhead = 0.0 if request.restart or state.playhead >= 1.0 else state.playhead
+            self._store.update(playing=True, playhead=playhead)
         else:
             self._store.update(playing=False)
 

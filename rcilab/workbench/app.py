@@ -33,7 +33,7 @@ from rcilab.app.scene.scene_extras import SceneState
 from rcilab.app.setup.setup_actions import OpenTab
 from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store, UiState
-from rcilab.app.view_actions import CommitField, DrawInSoftware, Seek, SetView
+from rcilab.app.view_actions import CommitField, DrawInSoftware, Play, Seek, SetView
 from rcilab.views.access_control import AccessPolicy
 from rcilab.views.viser_ext.client_messages import send_file
 from rcilab.views.viser_server import GuardedServer
@@ -219,6 +219,8 @@ class Workbench:
         match message:
             case live.Seek(share):
                 return Seek(page=page, playhead=self.renderer.playhead_at(min(max(share, 0.0), 1.0)))
+            case live.Play(playing):
+                return Play(page=page, playing=playing, restart=True)
             case live.Size(height):
                 return SetView(page=page, name="height", value=min(max(height, _LOWEST), _HIGHEST))
             case live.Tab(index):

@@ -64,6 +64,12 @@ class Seek(PageMessage):
     share: float
 
 
+class Play(PageMessage):
+    """The preview is to be played from its start, or paused."""
+
+    playing: bool
+
+
 class Size(PageMessage):
     """Height of the page's window, [px], sent when the page gets the controls and after changes."""
 
@@ -148,6 +154,7 @@ _DECODER = msgspec.json.Decoder(
     | Home
     | Extra
     | Seek
+    | Play
     | Size
     | Tab
     | Entered

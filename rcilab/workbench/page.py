@@ -38,6 +38,9 @@ def decorate(index: bytes, quality: str = "full") -> bytes:
         "resend",
         "labels",
         "toolbar",
+        "scene3d",
+        "measure",
+        "capture",
         "jog_devices",
         "draw",
     )

@@ -243,6 +243,7 @@
   };
 
   window.addEventListener("rl-say", (event) => send(event.detail));  // What the other scripts of the page have to say.
+  window.addEventListener("rl-notice", (event) => show(event.detail));  // And to the operator.
 
   const acts = () => Boolean(me) && said.holder === me.page;
   const size = () => { if (acts()) send({ kind: "size", height: window.innerHeight }); };

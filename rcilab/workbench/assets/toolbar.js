@@ -1,4 +1,4 @@
-// The toolbar in the scene, at its upper right corner: views of the camera, and what the scene shows besides.
+// The toolbar in the scene, at its upper right corner: views of the camera, what the scene shows besides, and tools.
 (() => {
   "use strict";
   const svg = (path) => `<svg viewBox="0 0 24 24" fill="none" stroke="currentColor" stroke-width="1.8" stroke-linecap="round" stroke-linejoin="round" aria-hidden="true">${path}</svg>`;
@@ -12,17 +12,22 @@
     ellipsoid: svg('<ellipse cx="12" cy="12" rx="9" ry="5" transform="rotate(-30 12 12)"/><path d="M12 12l6-3.5"/>'),
     cloud: svg('<path d="M4 18a9 9 0 0 1 16 0" stroke-dasharray="1.5 3"/><path d="M7 18a5.5 5.5 0 0 1 10 0" stroke-dasharray="1.5 3"/>'),
     swept: svg('<path d="M5 19V9 M5 9l5-3 M9 19a14 14 0 0 1 10-9 M12 20a10 10 0 0 1 8-6"/>'),
+    measure: svg('<path d="M3 15 15 3l6 6L9 21z M7 11l2 2 M10 8l3 3 M13 5l2 2"/>'),
+    picture: svg('<path d="M4 8h3l1.5-2.5h7L17 8h3v11H4z"/><circle cx="12" cy="13" r="3.5"/>'),
+    film: svg('<path d="M3 7h12v10H3z M15 11l6-3v8l-6-3"/>'),
   };
-  let bar = null, views = [], extras = [];
+  let bar = null, views = [], extras = [], tools = [], can = {};
+  const running = {};  // Tools that are on.
   const say = (detail) => window.dispatchEvent(new CustomEvent("rl-say", { detail }));
 
-  const button = (icon, label, press, pressed) => {
+  const button = (icon, label, press, pressed, disabled = false) => {
     const made = document.createElement("button");
     made.type = "button";
     made.innerHTML = ICONS[icon] || "";
     made.title = label;
     made.setAttribute("aria-label", label);
     if (pressed !== undefined) made.setAttribute("aria-pressed", String(pressed));
+    made.disabled = disabled;
     made.addEventListener("click", press);
     return made;
   };
@@ -38,6 +43,7 @@
     bar.replaceChildren(
       ...views.map(({ view, label }) => button(view, label, () => say({ kind: "home", view }))),
       ...extras.map(({ name, label, on }) => button(name, label, () => window.dispatchEvent(new CustomEvent("rl-act", { detail: { kind: "extra", name, on: !on } })), on)),
+      ...tools.map(({ name, label }) => button(name, label, () => window.dispatchEvent(new CustomEvent("rl-tool", { detail: { name } })), running[name], can[name] === false)),
     );
     if (focused >= 0 && bar.children[focused]) bar.children[focused].focus();
     place();
@@ -53,7 +59,11 @@
   window.addEventListener("rl-news", ({ detail }) => {
     if (detail.views) views = detail.views;
     if (detail.extras) extras = detail.extras;
-    if (detail.views || detail.extras) draw();
+    if (detail.tools) tools = detail.tools;
+    const film = "preview" in detail ? detail.preview !== null : can.film, isNew = film !== can.film;
+    can.film = film;
+    if (detail.views || detail.extras || detail.tools || isNew) draw();
   });
+  window.addEventListener("rl-tool-on", ({ detail }) => { running[detail.name] = detail.on; draw(); });
   setInterval(place, 300);
 })();

@@ -14,6 +14,7 @@ from rcilab.app.status_text import describe_status, phase_code
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
 from rcilab.views.viser_stage import VIEWS
+from rcilab.workbench.panels.scene_tools import scene_tools
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -48,6 +49,7 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
             {"name": extra, "label": text(f"extra.{extra}"), "on": extra in state.scene.extras}
             for extra in extras_of(state.model)
         ],
+        **scene_tools(state, status, text),
         "keys": [[text(f"key.{key}"), text(f"key.{key}_does")] for key in _KEYS],
         "lost": text("bar.lost"),
         "quality": state.quality,
