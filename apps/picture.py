@@ -214,7 +214,7 @@ def turn(camera: Camera) -> None:
     elbow = camera.bench.store.state.scene.elbow
     assert elbow is not None
     goal = [tuple(point) for point in elbow.circle.points(elbow.psi + np.linspace(0.0, 0.6, 3), OUTWARD)]
-    camera.glide(camera.spot("/elbow/handle"), 4, drawn=1)
+    camera.glide(camera.spot("/elbow_handle"), 4, drawn=1)
     places = [camera.spot("/live", point) for point in goal[1:]]
     with camera.held():
         for playhead in places:

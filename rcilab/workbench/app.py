@@ -28,8 +28,7 @@ from rcilab.app.run.replay import replayed, require_replayable
 from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.run.watch_actions import WatchActions
 from rcilab.app.run.watched_controller import WatchedController
-from rcilab.app.scene.scene_actions import HighlightBranch, ShowExtra
-from rcilab.app.scene.scene_extras import SceneState
+from rcilab.app.scene.scene_actions import CutWorkspace, EditElbow, HighlightBranch, ShowExtra
 from rcilab.app.setup.setup_actions import OpenTab
 from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store, UiState
@@ -108,7 +107,6 @@ class Workbench:
             target=target,
             watched="" if watched is None else watched.name,
             goal=goal,
-            scene=SceneState() if watched is None else SceneState(extras=frozenset()),
             language=config.language or "en",
             quality=config.quality or "full",
             is_quality_chosen=config.quality is not None,
@@ -235,12 +233,16 @@ class Workbench:
                 return DrawInSoftware(page=page)
             case live.Peek(branch):
                 return HighlightBranch(page=page, index=branch)
+            case live.Elbow(on):
+                return EditElbow(page=page, on=on)
             case live.Branch(index):
                 return ChooseBranch(page=page, index=index)
             case live.Condition(id):
                 return PressCheck(page=page, what="row", row=id)
             case live.Extra(name, on):
                 return ShowExtra(page=page, name=name, on=on)
+            case live.Cut(axis, at):
+                return CutWorkspace(page=page, axis=axis, at=at)
             case live.Entry(index):
                 return SelectEntry(page=page, index=index)
             case live.Rows(index):

@@ -58,6 +58,14 @@ class Extra(PageMessage):
     on: bool
 
 
+class Cut(PageMessage):
+    """The plane across the drawn workspace was moved."""
+
+    axis: Literal["none", "x", "y", "z"]
+    at: float
+    """[m]."""
+
+
 class Seek(PageMessage):
     """A plot was clicked at this share of its time axis, 0 to 1."""
 
@@ -104,6 +112,12 @@ class Peek(PageMessage):
     """The branch, from 0, under the mouse or with the focus; None when it is left."""
 
     branch: _Index | None
+
+
+class Elbow(PageMessage):
+    """The elbow's handle or its group of controls is pointed at, or is left."""
+
+    on: bool
 
 
 class Branch(PageMessage):
@@ -153,6 +167,7 @@ _DECODER = msgspec.json.Decoder(
     | Here
     | Home
     | Extra
+    | Cut
     | Seek
     | Play
     | Size
@@ -162,6 +177,7 @@ _DECODER = msgspec.json.Decoder(
     | Answer
     | Software
     | Peek
+    | Elbow
     | Branch
     | Condition
     | Entry

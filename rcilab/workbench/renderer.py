@@ -184,7 +184,7 @@ class Renderer:
             dress(self._server, state.theme)
         seen = displayed_state(state)
         self._stage.show(displayed_state(state, scene=True), status, self._text)
-        self._marks.show(seen)
+        self._marks.show(seen, self._text)
         is_whole = not self._can_wait(state, status)
         if is_whole:
             self._show_panels(state, seen, status)

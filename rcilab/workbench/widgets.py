@@ -21,6 +21,8 @@ from rcilab.i18n.units import Unit
 
 Ask: TypeAlias = Callable[[Request], None]
 
+FAINT = 0.45
+"""Opacity of handles unless they are pointed at: the arm behind them stays visible."""
 HAND_AWAY = 0.6  # [s] A control that was used within this time is not written to.
 _TYPING_PAUSE = 0.7  # [s] A typed number is taken after this time without a key.
 _ANSWER = 0.2  # [s] After this time the state contains the result of a typed number.

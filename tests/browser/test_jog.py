@@ -148,3 +148,46 @@ def test_a_question_mark_lists_the_keys(page):
     page.wait(lambda: "Dead-man button" in page.tab.locator("#rl-help").inner_text(), "the list of keys")
     page.tab.locator("body").press("?")
     page.wait(lambda: page.tab.locator("#rl-help").count() == 0, "no list")
+
+
+_SPACEMOUSE = """() => {
+  const mouse = window.fakeMouse = new EventTarget();
+  mouse.open = async () => {};
+  mouse.report = (id, bytes) => mouse.dispatchEvent(Object.assign(
+    new Event("inputreport"), { reportId: id, data: new DataView(new Uint8Array(bytes).buffer) }));
+  mouse.deflect = (id, bytes) => { mouse.timer = setInterval(() => mouse.report(id, bytes), 10); };
+  Object.defineProperty(navigator, "hid", { configurable: true, value: { requestDevice: async () => [mouse] } });
+}"""
+_UP = [0, 0, 0, 0, 0xD4, 0xFE]  # x, y, z as little-endian int16: -300, away from the table.
+_TURNED = [*_UP[:4], 0, 0, 0, 0, 0, 0, 0x2C, 0x01]  # With the turns in the same report: 300 about z.
+
+
+def test_a_spacemouse_jogs_only_with_a_button_pressed_and_stops_with_it_and_with_its_silence(jogging):
+    page, tab = jogging, jogging.tab
+    tab.evaluate(_SPACEMOUSE)
+    tab.locator("#rl-toolbar").get_by_role("button", name="SpaceMouse").click()
+    page.wait(lambda: "SpaceMouse connected" in page.toast(), "the device")
+    start = np.array(page.status.q_c)
+    tab.evaluate("bytes => fakeMouse.deflect(1, bytes)", _UP)
+    require_rest(page)
+    assert np.array_equal(page.status.q_c, start), "nothing moves without a button"
+    before = page.state.model.forward(start)
+    tab.evaluate("fakeMouse.report(3, [1, 0])")
+    page.wait(lambda: moves(page), "the tool to move")
+    tab.evaluate("fakeMouse.report(3, [0, 0])")
+    require_rest(page)
+    travel = page.state.model.forward(page.status.q_c).position - before.position
+    assert travel[2] > 1e-3
+    assert np.abs(travel[:2]).max() < 1e-4
+    page.wait(lambda: page.status.phase == "idle", "an idle arm")
+    tab.evaluate(
+        "bytes => { clearInterval(fakeMouse.timer); fakeMouse.report(3, [2, 0]); fakeMouse.deflect(1, bytes); }",
+        _TURNED,
+    )
+    page.wait(lambda: moves(page), "the tool to turn")
+    tab.evaluate("clearInterval(fakeMouse.timer)")
+    require_rest(page)
+    require_room(page)
+    now = page.state.model.forward(page.status.q_c)
+    assert np.linalg.norm(now.position - before.position - travel) < 1e-4
+    tab.evaluate("fakeMouse.report(3, [0, 0])")

@@ -28,13 +28,64 @@ def test_dragging_the_elbow_turns_it_and_leaves_the_tool(page):
     target = page.state.goal.target
     elbow = page.state.scene.elbow
     goal_place = elbow.circle.points(elbow.psi + 0.7, OUTWARD)[0] - elbow.circle.points(elbow.psi, OUTWARD)[0]
-    page.wait(lambda: page.is_drawn("/elbow/handle"), "the handle")
-    page.drag(page.project("/elbow/handle", (0, 0, 0)), page.project("/elbow/handle", tuple(goal_place)))
+    page.wait(lambda: page.is_drawn("/elbow_handle"), "the handle")
+    page.drag(page.project("/elbow_handle", (0, 0, 0)), page.project("/elbow_handle", tuple(goal_place)))
     page.wait(lambda: abs(page.state.goal.psi - elbow.psi) > 0.4, "the elbow to follow the mouse")
     goal = page.state.goal
     assert goal.target.is_close(target, 1e-9)
     assert page.state.model.forward(goal.q).is_close(target, 1e-6)
     page.wait(lambda: page.shows("candidate", page.state.goal.q), "the candidate arm with its elbow there")
+
+
+_OPACITY = """(name) => {
+  const found = [];
+  __viserMutable.nodeRefFromName[name].traverse(({ visible, material }) => { if (visible && material) found.push(material.opacity); });
+  return [Math.min(...found), Math.max(...found)];
+}"""  # noqa: E501
+"""Of the fainter and of the stronger parts of a node."""
+
+
+def test_handles_are_faint_until_pointed_at_and_the_elbow_has_its_circle_only_then(page):
+    tab = page.tab
+    page.wait(lambda: page.is_drawn("/elbow_handle"), "the handle")
+    tab.locator("#rl-brand").hover()
+    page.wait(lambda: tab.evaluate(_OPACITY, "/target") == [0.45, 0.45], "a faint target")
+    assert not page.state.scene.is_elbow_edited
+    assert not tab.evaluate("rcilabScene.isShown(rcilabScene.node('/elbow'))")
+    tab.mouse.move(*page.project("/target", (0.1, 0.0, 0.0)))
+    page.wait(lambda: tab.evaluate(_OPACITY, "/target")[0] == 1.0, "a target that can be seen")
+    assert tab.evaluate(_OPACITY, "/elbow_handle") == [0.55, 0.55]
+    tab.mouse.move(*page.project("/elbow_handle", (0.0, 0.0, 0.0)))
+    page.wait(lambda: tab.evaluate("rcilabScene.isShown(rcilabScene.node('/elbow'))"), "the circle")
+    assert tab.evaluate(_OPACITY, "/elbow_handle") == [1.0, 1.0]
+    tab.locator("#rl-brand").hover()
+    page.wait(lambda: not tab.evaluate("rcilabScene.isShown(rcilabScene.node('/elbow'))"), "no circle")
+    page.open_tab("Target")
+    page.group("rl-elbow").first.hover()
+    page.wait(lambda: page.state.scene.is_elbow_edited, "the circle, as its controls are pointed at")
+    tab.locator("#rl-brand").hover()
+    page.wait(lambda: not page.state.scene.is_elbow_edited, "no circle")
+
+
+def test_a_plan_and_the_workspace_have_legends_and_a_plane_cuts_the_workspace(page):
+    tab, legends = page.tab, page.tab.locator("#rl-legends")
+    page.plan_to(1, 15.0)
+    page.wait(lambda: "Path: share of the limits" in legends.inner_text(), "the legend of the path")
+    tab.get_by_role("button", name="Workspace").click()
+    page.wait(lambda: "close to a singularity" in legends.inner_text(), "the legend of the workspace")
+    count = """() => { let count = 0; const cloud = rcilabScene.node("/cloud");
+        if (cloud) cloud.traverse((o) => { if (o.isPoints) count = o.geometry.attributes.position.count; });
+        return count; }"""
+    page.wait(lambda: tab.evaluate(count) == 4000, "the workspace")
+    legends.get_by_role("button", name="z", exact=True).click()
+    page.wait(lambda: page.is_drawn("/cut") and tab.evaluate(count) < 4000, "the plane, and less of the workspace")
+    before = page.state.scene.cut.at
+    legends.get_by_role("slider").press("ArrowLeft")
+    page.wait(lambda: page.state.scene.cut.at < before, "the plane to move")
+    legends.get_by_role("button", name="off").click()
+    page.wait(lambda: page.state.scene.cut is None and tab.evaluate(count) == 4000, "the whole workspace")
+    tab.get_by_role("button", name="Workspace").click()
+    page.wait(lambda: "Workspace" not in legends.inner_text(), "no legend of it")
 
 
 def test_a_way_to_stand_is_seen_under_the_mouse_and_taken_with_enter(page):

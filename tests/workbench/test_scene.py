@@ -16,7 +16,15 @@ from rcilab.app.goal.elbow import compute_elbow, nearest_free
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import SETTLED, GoalActions, MoveTarget, PlanGoal, PoseGoal, SetArmAngle, SetPathType
 from rcilab.app.request import TypeField
-from rcilab.app.scene.scene_actions import DragElbow, HighlightBranch, SceneActions, ShowExtra, ShowViolation
+from rcilab.app.scene.scene_actions import (
+    CutWorkspace,
+    DragElbow,
+    EditElbow,
+    HighlightBranch,
+    SceneActions,
+    ShowExtra,
+    ShowViolation,
+)
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import Text
 from rcilab.control_process import SupervisorStatus
@@ -24,11 +32,14 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.locale import LANGUAGES
 from rcilab.model.robot_model import load_model
+from rcilab.views.null_scene import NullScene
 from rcilab.workbench.live import Here, Home, LiveChannel, PageMessage, Peek
 from rcilab.workbench.panels.branches import BranchesPanel
 from rcilab.workbench.panels.elbow import ring_html
+from rcilab.workbench.panels.scene_legends import scene_legends
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.panels.timeline import TimelinePanel
+from rcilab.workbench.scene.elbow_view import ElbowSceneView
 from rcilab.workbench.scene.goal_view import folded
 from rcilab.workbench.scene.path_strip_view import bead_words
 
@@ -314,6 +325,68 @@ def test_extras_are_computed_when_they_are_switched_on_and_gone_when_off(bench):
         bench.scene.show_extra(ShowExtra(name=name, on=False))
     bench.scene.tick()
     assert (bench.state.scene.ellipsoid, bench.state.scene.cloud, bench.state.scene.swept) == (None, None, None)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_path_and_workspace_have_legends_and_the_workspace_can_be_cut(bench, language):
+    assert scene_legends(bench.state, Text(language)) == []
+    bench.aim(0.0, 0.1, 0.0)
+    bench.scene.show_extra(ShowExtra(name="cloud", on=True))
+    bench.scene.tick()
+    bench.scene._made["cloud"].result(30.0)
+    bench.scene.tick()
+    path, cloud = scene_legends(bench.state, Text(language))
+    assert (path["id"], cloud["id"]) == ("path", "cloud")
+    assert path["colors"][0] == "rgb(20, 140, 170)"
+    assert path["beyond"]["color"] == "rgb(214, 30, 38)"
+    assert "legend." not in str((path, cloud))
+    assert cloud["cut"]["axis"] == "none"
+    position = bench.state.scene.cloud.position
+    for axis, column, sign in (("x", 0, 1.0), ("y", 1, -1.0), ("z", 2, 1.0)):
+        bench.scene.cut(CutWorkspace(axis=axis, at=0.2))
+        kept = bench.state.scene.cut.keeps(position)
+        assert 0 < kept.sum() < len(position)
+        assert (sign * position[kept, column] <= sign * 0.2).all(), "the side away from the first view's camera"
+        assert (sign * position[~kept, column] > sign * 0.2).all()
+    assert scene_legends(bench.state, Text(language))[1]["cut"]["shown"] == "200 mm"
+    bench.scene.cut(CutWorkspace(axis="x", at=math.nan))
+    assert bench.state.scene.cut.axis == "z"
+    bench.scene.cut(CutWorkspace(axis="none", at=0.0))
+    assert bench.state.scene.cut is None
+
+
+class Drawn:
+    """A scene of viser that keeps the labels only."""
+
+    def add_label(self, name: str, text: str, **props: object) -> SimpleNamespace:
+        return SimpleNamespace(text=text, **props, remove=lambda: None)
+
+
+class ElbowScene(NullScene):
+    """A scene whose nodes can be dragged."""
+
+    def on_drag(self, name: str, callback: object) -> None:
+        pass
+
+
+def test_the_circle_of_the_elbow_is_drawn_only_while_the_elbow_is_edited_or_switched_on(bench):
+    drawing = ElbowScene()
+    view = ElbowSceneView(SimpleNamespace(scene=Drawn()), drawing, lambda request: None)
+
+    def shown(status: SupervisorStatus = STANDING) -> tuple[bool, bool, bool]:
+        view.show(bench.state, status, Text("en"))
+        return drawing.is_shown("/elbow_handle"), drawing.is_shown("/elbow"), view._label.visible
+
+    act = bench.scene.handlers
+    assert shown() == (True, False, False)
+    act[EditElbow](EditElbow(on=True))
+    assert shown() == (True, True, True)
+    assert view._label.text == "Elbow: ψ 0°"
+    assert shown(replace(STANDING, phase="moving")) == (False, False, False)
+    act[EditElbow](EditElbow(on=False))
+    assert shown() == (True, False, False)
+    bench.scene.show_extra(ShowExtra(name="elbow", on=True))
+    assert shown() == (True, True, True)
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

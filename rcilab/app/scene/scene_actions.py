@@ -16,7 +16,13 @@ from rcilab.app.goal.goal_actions import GoalActions, SetArmAngle
 from rcilab.app.request import Handlers, Request
 from rcilab.app.scene.closest import compute_closest
 from rcilab.app.scene.path_strip import compute_path_strip
-from rcilab.app.scene.scene_extras import EXTRAS, compute_ellipsoid, compute_swept_volume, compute_workspace
+from rcilab.app.scene.scene_extras import (
+    EXTRAS,
+    WorkspaceCut,
+    compute_ellipsoid,
+    compute_swept_volume,
+    compute_workspace,
+)
 from rcilab.app.store import Store
 from rcilab.i18n.translator import message
 from rcilab.views.elbow_view import OUTWARD
@@ -52,6 +58,15 @@ class HighlightBranch(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class EditElbow(Request):
+    """The elbow's handle or its controls are pointed at, or are left: its circle is shown meanwhile."""
+
+    is_silent: ClassVar[bool] = True
+
+    on: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ShowViolation(Request):
     """Go to a violation on the path and say what it is."""
 
@@ -65,6 +80,19 @@ class ShowExtra(Request):
 
     name: str
     on: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CutWorkspace(Request):
+    """A plane across the drawn workspace was moved."""
+
+    axis: Literal["none", "x", "y", "z"]
+    at: float
+    """Where it crosses that axis of the base, [m]."""
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return f"CutWorkspace.{self.page}"
 
 
 class SceneActions:
@@ -87,8 +115,10 @@ class SceneActions:
         return {
             DragElbow: self.drag_elbow,
             HighlightBranch: self.peek,
+            EditElbow: lambda request: self._change(is_elbow_edited=request.on),
             ShowViolation: self.show_violation,
             ShowExtra: self.show_extra,
+            CutWorkspace: self.cut,
         }
 
     def close(self) -> None:
@@ -129,6 +159,13 @@ class SceneActions:
         if extra is not None:
             extras = self._store.state.scene.extras
             self._change(extras=extras | {extra} if request.on else extras - {extra})
+
+    def cut(self, request: CutWorkspace) -> None:
+        """Draws the workspace up to a plane only, or all of it."""
+        if request.axis == "none":
+            self._change(cut=None)
+        elif math.isfinite(request.at):
+            self._change(cut=WorkspaceCut(axis=request.axis, at=request.at))
 
     def tick(self) -> None:
         """Looks at what has changed since the last tick."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcilab.app.goal.elbow import Elbow
 from rcilab.app.scene.path_strip import PathStrip
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 Extra: TypeAlias = Literal["elbow", "frames", "ellipsoid", "cloud", "swept"]
 EXTRAS: tuple[Extra, ...] = ("elbow", "frames", "ellipsoid", "cloud", "swept")
+
+CUT_AXES = ("x", "y", "z")
 
 SHARE = 0.3
 """Length that a tool speed of 1 m/s for joints at 1 rad/s is drawn with, [m]."""
@@ -43,12 +46,29 @@ class Ellipsoid:
     """Along each, shape (3,), [m/s]."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkspaceCut:
+    """A plane across the workspace: the part on the side of the first view's camera is not drawn."""
+
+    axis: Literal["x", "y", "z"]
+    """Axis of the base that is normal to it."""
+    at: float
+    """Where it crosses that axis, [m]."""
+
+    def keeps(self, position: Array) -> NDArray[np.bool_]:
+        """Returns which of the positions, shape (N, 3), [m], are drawn, shape (N,)."""
+        along = position[:, CUT_AXES.index(self.axis)]
+        return along >= self.at if self.axis == "y" else along <= self.at
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SceneState:
     """What was computed for the scene, and what is chosen to be seen of it."""
 
-    extras: frozenset[Extra] = frozenset(("elbow",))
+    extras: frozenset[Extra] = frozenset()
     elbow: Elbow | None = None
+    is_elbow_edited: bool = False
+    """Whether the elbow's circle is shown because the elbow is edited."""
     ribbon: PathStrip | None = None
     closest: ClosestPoints | None = None
     """Where the plan is too near to an obstacle."""
@@ -56,6 +76,7 @@ class SceneState:
     """Which branch of the goal is under the mouse or has the focus, from 0."""
     ellipsoid: Ellipsoid | None = None
     cloud: Workspace | None = field(default=None, repr=False)
+    cut: WorkspaceCut | None = None
     swept: Mesh | None = field(default=None, repr=False)
 
 

@@ -28,7 +28,7 @@
       return;
     }
     const style = getComputedStyle(node), area = node.getBoundingClientRect(), of = (name) => Number(node.getAttribute(name));
-    if (style.display === "none") return;
+    if (style.display === "none" || node.matches("button, input")) return;
     context.beginPath();
     if (node.tagName === "line") { context.moveTo(of("x1"), of("y1")); context.lineTo(of("x2"), of("y2")); }
     else if (node.tagName === "circle") context.arc(of("cx"), of("cy"), of("r"), 0, 2 * Math.PI);

@@ -75,7 +75,7 @@
     on = wanted;
     picks = [];
     shown = "";
-    scene.setReacting(!on);
+    scene.block("measure", on);
     document.documentElement.classList.toggle("rl-measuring", on);
     window.dispatchEvent(new CustomEvent("rl-tool-on", { detail: { name: "measure", on } }));
     if (on) { build(); follow(); } else { lines.remove(); card.remove(); }

@@ -7,6 +7,7 @@
   const SOLID = /^\/live\/(.*\/)?(base_\w+|shell|cap|dark|carried)$|^\/cell\/obstacle\d+\/mesh$/;  // Nodes of what is solid.
   const viser = () => window.__viserMutable || {};
   const node = (name) => (viser().nodeRefFromName || {})[name];
+  const nodes = () => Object.entries(viser().nodeRefFromName || {}).filter(([, object]) => object);
   // State of react-three-fiber: raycaster, camera, and whether objects get pointer events.
   const fiber = () => { const { scene } = viser(), root = scene && scene.__r3f && scene.__r3f.root; return root ? root.getState() : null; };
   const canvas = () => document.querySelector("#root canvas[data-engine]");
@@ -19,6 +20,12 @@
     if (point.clone().applyMatrix4(camera.matrixWorldInverse).z >= 0) return null;
     const { x, y } = point.clone().project(camera);
     return [scene.left + (x + 1) / 2 * scene.width, scene.top + (1 - y) / 2 * scene.height];
+  };
+
+  // How large 1 m is seen at a point, [px].
+  const scale = (point) => {
+    const { camera } = viser(), depth = -point.clone().applyMatrix4(camera.matrixWorldInverse).z;
+    return depth > 0 ? box().height / 2 * camera.projectionMatrix.elements[5] / depth : 0;
   };
 
   const floor = (ray) => {
@@ -39,7 +46,7 @@
     const pointer = state.pointer.clone().set((x - scene.left) / scene.width * 2 - 1, 1 - (y - scene.top) / scene.height * 2);
     const { raycaster } = state;
     raycaster.setFromCamera(pointer, viser().camera);
-    const names = new Map(Object.entries(viser().nodeRefFromName).map(([name, object]) => [object, name]));
+    const names = new Map(nodes().map(([name, object]) => [object, name]));
     const ownerOf = (object) => { while (object && !names.has(object)) object = object.parent; return names.get(object) || ""; };
     const hit = ["/live", "/cell"].filter(node).flatMap((root) => raycaster.intersectObject(node(root), true))
       .filter(({ object, face }) => face && SOLID.test(ownerOf(object)) && isShown(object))
@@ -49,9 +56,15 @@
     return hit && { owner: ownerOf(hit.object), object: hit.object, point: hit.object.worldToLocal(hit.point.clone()), normal: hit.face.normal.clone() };
   };
 
-  // Whether the objects of the scene react to the pointer; the camera always does.
-  const setReacting = (enabled) => { const state = fiber(); if (state) state.setEvents({ enabled }); };
+  // Objects of the scene do not react to the pointer while anything blocks them; the camera always does.
+  const blocks = new Set();
+  const block = (reason, on) => {
+    const state = fiber();
+    if (on) blocks.add(reason); else blocks.delete(reason);
+    if (state) state.setEvents({ enabled: blocks.size === 0 });
+  };
+  const stopCamera = () => { const { cameraControl } = viser(); if (cameraControl) cameraControl.cancel(); };
   const isIn = (object) => { while (object && object.parent) object = object.parent; return object === viser().scene; };
   const draw = () => { if (viser().requestRender) viser().requestRender(); };
-  window.rcilabScene = { canvas, box, node, project, pick, setReacting, isIn, draw };
+  window.rcilabScene = { canvas, box, node, nodes, project, scale, pick, block, isIn, isShown, stopCamera, draw };
 })();

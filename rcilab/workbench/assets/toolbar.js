@@ -14,9 +14,11 @@
     swept: svg('<path d="M5 19V9 M5 9l5-3 M9 19a14 14 0 0 1 10-9 M12 20a10 10 0 0 1 8-6"/>'),
     measure: svg('<path d="M3 15 15 3l6 6L9 21z M7 11l2 2 M10 8l3 3 M13 5l2 2"/>'),
     picture: svg('<path d="M4 8h3l1.5-2.5h7L17 8h3v11H4z"/><circle cx="12" cy="13" r="3.5"/>'),
+    spacemouse: svg('<ellipse cx="12" cy="9" rx="5.5" ry="4"/><path d="M6.5 9v3.5c0 5 11 5 11 0V9 M3.5 16.5c1 5 16 5 17 0"/>'),
     film: svg('<path d="M3 7h12v10H3z M15 11l6-3v8l-6-3"/>'),
   };
-  let bar = null, views = [], extras = [], tools = [], can = {};
+  let bar = null, views = [], extras = [], tools = [];
+  const can = { film: false };  // Tools that cannot be used now.
   const running = {};  // Tools that are on.
   const say = (detail) => window.dispatchEvent(new CustomEvent("rl-say", { detail }));
 
@@ -43,7 +45,7 @@
     bar.replaceChildren(
       ...views.map(({ view, label }) => button(view, label, () => say({ kind: "home", view }))),
       ...extras.map(({ name, label, on }) => button(name, label, () => window.dispatchEvent(new CustomEvent("rl-act", { detail: { kind: "extra", name, on: !on } })), on)),
-      ...tools.map(({ name, label }) => button(name, label, () => window.dispatchEvent(new CustomEvent("rl-tool", { detail: { name } })), running[name], can[name] === false)),
+      ...tools.filter(({ name }) => name !== "spacemouse" || navigator.hid).map(({ name, label }) => button(name, label, () => window.dispatchEvent(new CustomEvent("rl-tool", { detail: { name } })), running[name], can[name] === false)),
     );
     if (focused >= 0 && bar.children[focused]) bar.children[focused].focus();
     place();

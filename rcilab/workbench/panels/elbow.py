@@ -38,7 +38,7 @@ class ElbowPanel:
         if not state.model.redundancy:
             return
         with gui.add_folder(text("target.psi_title")):
-            gui.add_html('<i class="rl-rows"></i>')
+            gui.add_html('<i class="rl-rows rl-elbow"></i>')
             factor, _ = text.units.from_si("rad")
             step = 1.0 if text.units.angle == "deg" else 0.01
             lowest, highest = (step * int(factor * end / step) for end in _ends(state.model))

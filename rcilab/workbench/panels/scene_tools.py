@@ -11,18 +11,19 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
-_TOOLS = ("measure", "picture", "film")
+_TOOLS = ("measure", "picture", "film", "spacemouse")
 """In the order of the toolbar."""
 _DIGITS = {"mm": 1, "m": 4, "°": 1, "rad": 3}
 """Decimals of a measured value, by unit."""
 
 
 def scene_tools(state: UiState, status: SupervisorStatus, text: Text) -> dict[str, Any]:
-    """Returns the values of measuring, picture and film, for `LiveChannel.publish`."""
+    """Returns the values of measuring, picture, film and SpaceMouse, for `LiveChannel.publish`."""
     return {
         "tools": [{"name": tool, "label": text(f"tool.{tool}")} for tool in _TOOLS],
         "measure": _measure(state, text),
         "film": {name: text(f"film.{name}") for name in ("recording", "cancel", "none")},
+        "spacemouse": {name: text(f"spacemouse.{name}") for name in ("ready", "closed")},
         "preview": None
         if state.plan is None or is_moving(status)
         else {"share": round(state.playhead, 3), "playing": state.playing},

@@ -14,6 +14,7 @@ from rcilab.app.status_text import describe_status, phase_code
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
 from rcilab.views.viser_stage import VIEWS
+from rcilab.workbench.panels.scene_legends import scene_legends
 from rcilab.workbench.panels.scene_tools import scene_tools
 
 if TYPE_CHECKING:
@@ -32,8 +33,8 @@ _TONES = {
     "lost.rebooted": "warn",
 }
 
-_KEYS = ("stop", "home", "joint", "joint_back", "held", "pad", "sticks", "cross", "undo", "help")
-"""Keys and buttons of a gamepad, in the order of their list."""
+_KEYS = ("stop", "home", "joint", "joint_back", "held", "pad", "sticks", "cross", "space", "cap", "undo", "help")
+"""Keys, and buttons of a gamepad and a SpaceMouse, in the order of their list."""
 
 
 def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_end: float) -> dict[str, Any]:
@@ -49,6 +50,7 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
             {"name": extra, "label": text(f"extra.{extra}"), "on": extra in state.scene.extras}
             for extra in extras_of(state.model)
         ],
+        "legends": scene_legends(state, text),
         **scene_tools(state, status, text),
         "keys": [[text(f"key.{key}"), text(f"key.{key}_does")] for key in _KEYS],
         "lost": text("bar.lost"),

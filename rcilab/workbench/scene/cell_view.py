@@ -14,7 +14,7 @@ from rcilab.app.text import Text
 from rcilab.views.cell_view import TOUCHED_COLOR, CellView
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench.panels.cell import touched_obstacle
-from rcilab.workbench.widgets import HAND_AWAY, Ask
+from rcilab.workbench.widgets import FAINT, HAND_AWAY, Ask
 
 if TYPE_CHECKING:
     import viser
@@ -45,6 +45,7 @@ class CellSceneView:
         self._closest: ClosestPoints | None = None
         self._distance: Any = None
         self._gizmo: Any = None
+        self._name: Any = None  # Of what has handles.
         self._edited: Entry | None = None
         self._touched = float("-inf")
 
@@ -67,6 +68,10 @@ class CellSceneView:
         if entry != self._edited:
             self._exchange_handles(cell, entry)
         self._follow(cell, entry)
+        if entry is not None:
+            sentence = text("setup.handles", part=entry.name)
+            if sentence != self._name.text:
+                self._name.text = sentence
 
     def remove(self) -> None:
         """Removes everything."""
@@ -129,15 +134,20 @@ class CellSceneView:
 
     def _exchange_handles(self, cell: Cell | None, entry: Entry | None) -> None:
         if self._gizmo is not None:
-            self._gizmo.remove()
-            self._gizmo = None
+            self._gizmo.remove()  # With its name.
+            self._gizmo = self._name = None
         self._edited = entry
         if cell is None or entry is None:
             return
         pose, index = base_pose_of(cell, entry), entries_of(cell).index(entry)
         self._gizmo = self._server.scene.add_transform_controls(
-            "/cell_handles", scale=_SCALE, line_width=3.0, depth_test=False, wxyz=pose.wxyz, position=pose.position
-        )
+            "/cell_handles", scale=_SCALE, line_width=3.0, depth_test=False, opacity=FAINT, wxyz=pose.wxyz,
+            position=pose.position,
+        )  # fmt: skip
+        self._name = self._server.scene.add_label(
+            "/cell_handles/name", "", position=(0.0, 0.0, 1.15 * _SCALE), anchor="bottom-center", depth_test=False,
+            font_screen_scale=1.0,
+        )  # fmt: skip
 
         @self._gizmo.on_update
         async def _(event: Any) -> None:

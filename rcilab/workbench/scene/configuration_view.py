@@ -19,7 +19,7 @@ from rcilab.robots.mesh import revolve
 from rcilab.views.arm_view import ArmView
 from rcilab.views.configuration_view import BOX_COLOR, ConfigurationView, outside_runs
 from rcilab.views.viser_scene import ViserScene
-from rcilab.workbench.widgets import HAND_AWAY, Ask
+from rcilab.workbench.widgets import FAINT, HAND_AWAY, Ask
 
 if TYPE_CHECKING:
     import viser
@@ -113,7 +113,7 @@ class ConfigurationSceneView:
         is_straight = part == "load" or (part == "box" and not capabilities_of(state.model).turns_box)
         name = "/setup_box" if part == "box" else f"{self._flange}/handles_{part}"
         self._gizmo = self._server.scene.add_transform_controls(
-            name, scale=_SCALES[part], line_width=3.0, depth_test=False, disable_rotations=is_straight,
+            name, scale=_SCALES[part], line_width=3.0, depth_test=False, opacity=FAINT, disable_rotations=is_straight,
             wxyz=pose.wxyz, position=pose.position,
         )  # fmt: skip
 

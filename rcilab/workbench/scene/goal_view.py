@@ -14,7 +14,7 @@ from rcilab.app.setup.configuration_state import goal_verdict
 from rcilab.app.text import Text
 from rcilab.i18n.translator import with_space
 from rcilab.workbench.scene.configuration_view import hides_target
-from rcilab.workbench.widgets import HAND_AWAY, Ask
+from rcilab.workbench.widgets import FAINT, HAND_AWAY, Ask
 
 if TYPE_CHECKING:
     import viser
@@ -45,10 +45,16 @@ class GoalView:
         self._target: object = None
         self._touched = float("-inf")
         self._gizmo: Any = scene.add_transform_controls(
-            "/target", scale=_GIZMO_SCALE, line_width=3.0, depth_test=False, wxyz=pose.wxyz, position=pose.position
+            "/target",
+            scale=_GIZMO_SCALE,
+            line_width=3.0,
+            depth_test=False,
+            opacity=FAINT,
+            wxyz=pose.wxyz,
+            position=pose.position,
         )
         self._mark: Any = scene.add_icosphere(
-            "/mark", radius=0.075, color=TONE_COLORS["good"], opacity=0.4, cast_shadow=False, receive_shadow=False,
+            "/mark", radius=0.028, color=TONE_COLORS["good"], opacity=0.4, cast_shadow=False, receive_shadow=False,
             position=pose.position,
         )  # fmt: skip
         self._label: Any = scene.add_label(

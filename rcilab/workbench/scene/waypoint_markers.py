@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.app.program.program_draft import placed, target_in_base
+from rcilab.app.text import Text
 from rcilab.core.arrays import Array
 from rcilab.core.errors import RcilabError
 
@@ -27,7 +28,7 @@ _ABOVE = 0.022  # [m]
 
 
 class ProgramMarks:
-    """Draws the program of the state; the selected waypoint and a failed one stand out by colour and sign.
+    """Draws the program of the state; the selected waypoint and a failed one stand out by colour and text.
 
     Args:
         server: The page.
@@ -41,11 +42,11 @@ class ProgramMarks:
         self._clouds: list[Any] = []
         self._labels: list[Any] = []
 
-    def show(self, state: UiState) -> None:
+    def show(self, state: UiState, text: Text) -> None:
         """Draws what has changed."""
         program = state.program
         draft = placed(program.draft, state.cell.cell)
-        drawn = (draft, program.selected, program.failed, state.model)
+        drawn = (draft, program.selected, program.failed, state.model, text.language)
         if drawn == self._drawn:
             return
         self._drawn = drawn
@@ -57,8 +58,9 @@ class ProgramMarks:
             key: color for key, color in ((program.selected, _CHOSEN), (program.failed, _FAILED)) if key in self._points
         }
         self._show_points(special, is_moved)
+        names = {key: text("program.mark", number=self._points[key][0]) for key in special if key is not None}
         numbers = [
-            (number, f"{number} !" if key == program.failed else f"[{number}]" if key == program.selected else "")
+            (number, f"{number} !" if key == program.failed else names.get(key, ""))
             for key, (number, _) in self._points.items()
         ]
         points = [position for _, position in self._points.values()]
