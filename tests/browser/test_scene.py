@@ -206,3 +206,31 @@ def test_the_toolbar_turns_the_camera_and_shows_what_is_switched_on(page):
     page.wait(lambda: "frames" not in page.state.scene.extras, "no frames")
     tab.get_by_role("button", name="View of the whole arm").click()
     page.wait(lambda: abs(tab.evaluate(where)[0]) > 0.5, "the first view")
+
+
+def test_a_finger_turns_the_camera_and_moves_a_handle_only_after_a_long_press(page):
+    tab, session = page.tab, page.tab.context.new_cdp_session(page.tab)
+    where = "() => __viserMutable.camera.position.toArray()"
+
+    def touch(kind: str, *points: tuple[float, float]) -> None:
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]})
+
+    def swipe(pause: float) -> None:
+        x, y = page.project("/target", (0.2, 0.0, 0.0))  # Its arrow along x.
+        touch("touchStart", (x, y))
+        tab.wait_for_timeout(pause)
+        for step in range(1, 7):
+            touch("touchMove", (x + 8 * step, y - 4 * step))
+            tab.wait_for_timeout(60)
+        touch("touchEnd")
+
+    target, before = page.state.goal.target, tab.evaluate(where)
+    swipe(0)
+    page.wait(lambda: np.abs(np.subtract(tab.evaluate(where), before)).max() > 0.05, "the camera to turn")
+    assert page.state.goal.target.is_close(target, 0.0)
+    tab.get_by_role("button", name="View of the whole arm").click()
+    page.wait(lambda: np.abs(np.subtract(tab.evaluate(where), before)).max() < 0.01, "the camera to come back")
+    swipe(700)
+    page.wait(lambda: not page.state.goal.target.is_close(target, 1e-3), "the target to follow")
+    assert np.abs(np.subtract(tab.evaluate(where), before)).max() < 0.01, "not the camera"
+    tab.mouse.move(5, 5)
