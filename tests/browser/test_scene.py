@@ -50,14 +50,13 @@ def test_handles_are_faint_until_pointed_at_and_the_elbow_has_its_circle_only_th
     page.wait(lambda: page.is_drawn("/elbow_handle"), "the handle")
     tab.locator("#rl-brand").hover()
     page.wait(lambda: tab.evaluate(_OPACITY, "/target") == [0.45, 0.45], "a faint target")
-    assert not page.state.scene.is_elbow_edited
-    assert not tab.evaluate("rcilabScene.isShown(rcilabScene.node('/elbow'))")
+    page.wait(lambda: not tab.evaluate("rcilabScene.isShown(rcilabScene.node('/elbow'))"), "no circle")
     tab.mouse.move(*page.project("/target", (0.1, 0.0, 0.0)))
     page.wait(lambda: tab.evaluate(_OPACITY, "/target")[0] == 1.0, "a target that can be seen")
     assert tab.evaluate(_OPACITY, "/elbow_handle") == [0.55, 0.55]
     tab.mouse.move(*page.project("/elbow_handle", (0.0, 0.0, 0.0)))
     page.wait(lambda: tab.evaluate("rcilabScene.isShown(rcilabScene.node('/elbow'))"), "the circle")
-    assert tab.evaluate(_OPACITY, "/elbow_handle") == [1.0, 1.0]
+    page.wait(lambda: tab.evaluate(_OPACITY, "/elbow_handle") == [1.0, 1.0], "a handle that can be seen")
     tab.locator("#rl-brand").hover()
     page.wait(lambda: not tab.evaluate("rcilabScene.isShown(rcilabScene.node('/elbow'))"), "no circle")
     page.open_tab("Target")
