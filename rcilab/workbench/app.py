@@ -35,10 +35,11 @@ from rcilab.app.store import Store, UiState
 from rcilab.app.view_actions import CommitField, DrawInSoftware, Play, Seek, SetView
 from rcilab.views.access_control import AccessPolicy
 from rcilab.views.viser_ext.client_messages import send_file
+from rcilab.views.viser_ext.control_list import list_controls
 from rcilab.views.viser_server import GuardedServer
 from rcilab.views.viser_stage import ViserEnvironment
 from rcilab.workbench import live, security
-from rcilab.workbench.page import decorate, introduce
+from rcilab.workbench.page import decorate, introduce, send_commands
 from rcilab.workbench.renderer import Renderer, tab_name
 
 if TYPE_CHECKING:
@@ -208,6 +209,8 @@ class Workbench:
             self._here(page)
         elif isinstance(message, live.Home):
             self._bring_back(page, message.view)
+        elif isinstance(message, live.Commands):
+            self._list_commands(page)
         else:
             if isinstance(message, live.Tab):
                 self.renderer.open_tab(page, message.index)
@@ -257,6 +260,12 @@ class Workbench:
         """Moves the camera of a page to a view; those of other pages stay."""
         if page in self._views:
             self._views[page].reset(view)
+
+    def _list_commands(self, page: int) -> None:
+        """Sends a page the list of its controls, for its command palette."""
+        client = self.server.get_clients().get(page)
+        if client is not None:
+            send_commands(client, list_controls(self.server))
 
     def _here(self, page: int) -> None:
         """Registers a heartbeat of a page; only that of the operator counts for the robot."""

@@ -66,6 +66,10 @@ class Cut(PageMessage):
     """[m]."""
 
 
+class Commands(PageMessage):
+    """The page asks for the list of its controls."""
+
+
 class Seek(PageMessage):
     """A plot was clicked at this share of its time axis, 0 to 1."""
 
@@ -166,6 +170,7 @@ _DECODER = msgspec.json.Decoder(
     | Stop
     | Here
     | Home
+    | Commands
     | Extra
     | Cut
     | Seek

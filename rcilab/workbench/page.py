@@ -11,6 +11,8 @@ from rcilab.views.viser_ext.client_messages import run_javascript
 if TYPE_CHECKING:
     import viser
 
+    from rcilab.views.viser_ext.control_list import Control
+
 _BRAND = (11, 111, 194)
 
 
@@ -46,6 +48,7 @@ def decorate(index: bytes, quality: str = "full") -> bytes:
         "capture",
         "jog_devices",
         "draw",
+        "palette",
     )
     script = b"\n".join((assets / f"{name}.js").read_bytes() for name in scripts)
     head = b"<style>" + style + b"</style><script>" + script + b"</script></head>"
@@ -58,6 +61,22 @@ def introduce(client: viser.ClientHandle, key: str) -> None:
     """Informs a page of its client id, and of the key that proves it on its live connection."""
     call = f"window.rcilabPage?.({client.client_id}, {json.dumps(key)});"
     run_javascript(client, call)
+
+
+def send_commands(client: viser.ClientHandle, controls: list[Control]) -> None:
+    """Sends a page the list for its command palette."""
+    facts = [
+        {
+            "id": one.uuid,
+            "name": one.label,
+            "hint": one.hint,
+            "place": one.place,
+            "off": one.is_disabled,
+            "options": one.options,
+        }
+        for one in controls
+    ]
+    run_javascript(client, f"window.rcilabCommands?.({json.dumps(facts)});")
 
 
 def dress(server: viser.ViserServer, theme: str) -> None:

@@ -15,6 +15,9 @@ PATCHES = PACKAGE / "views" / "viser_ext"
 USED = {
     "assignments": {"viser._assignable_props_api", "_cast_value_recursive", "_prop_hints"},
     "client_messages": {"viser._messages", "_websock_interface"},
+    "control_list": {
+        "_container_handle_from_uuid", "_gui_input_handle_from_uuid", "_impl", "_label",
+    },
     "icons": {"viser._gui_api", "viser._gui_handles", "viser._icons"},
     "loop_event": {"viser.infra", "viser.infra._infra", "viser.infra._async_message_buffer"},
     "message_guard": {

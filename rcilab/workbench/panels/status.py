@@ -33,7 +33,10 @@ _TONES = {
     "lost.rebooted": "warn",
 }
 
-_KEYS = ("stop", "home", "joint", "joint_back", "held", "pad", "sticks", "cross", "space", "cap", "undo", "help")
+_KEYS = (
+    "stop", "home", "joint", "joint_back", "held", "pad", "sticks", "cross", "space", "cap", "undo", "palette",
+    "help",
+)  # fmt: skip
 """Keys, and buttons of a gamepad and a SpaceMouse, in the order of their list."""
 
 
@@ -53,6 +56,7 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         "legends": scene_legends(state, text),
         **scene_tools(state, status, text),
         "keys": [[text(f"key.{key}"), text(f"key.{key}_does")] for key in _KEYS],
+        "palette": {name: text(f"palette.{name}") for name in ("title", "find", "none", "tab", "scene")},
         "lost": text("bar.lost"),
         "quality": state.quality,
         "software": text("bar.software") if state.quality == "full" else "",
