@@ -48,12 +48,11 @@ def list_controls(server: viser.ViserServer) -> list[Control]:
 def _place_of(gui: Any, handle: Any) -> tuple[str, ...] | None:
     """Returns the labels of the containers, outermost first; None if one is not visible."""
     labels: list[str] = []
-    while handle is not None:
-        container = gui._container_handle_from_uuid.get(handle._impl.parent_container_id)
+    while True:
+        container: Any = gui._container_handle_from_uuid.get(handle._impl.parent_container_id)
         if container is None or not hasattr(container, "_impl"):
             return (container._label, *labels) if hasattr(container, "_label") else tuple(labels)
         if not container._impl.props.visible:
             return None
         labels.insert(0, container._impl.props.label)
         handle = container
-    return tuple(labels)

@@ -47,7 +47,7 @@
       if (options.length) options.forEach((option) => found.push({ ...entry, name: `${name}: ${option}`, run: () => use(id, place, choose(option)) }));
       else found.push({ ...entry, name, run: () => use(id, place, (control) => control.click()) });
     }
-    document.querySelectorAll("#rl-toolbar button").forEach((button) => found.push({ name: button.title, place: words.scene, hint: "", run: () => button.click() }));
+    document.querySelectorAll("#rl-toolbar button").forEach((button, index) => found.push({ name: button.title, place: words.scene, hint: "", off: button.disabled, run: () => document.querySelectorAll("#rl-toolbar button")[index].click() }));
     return found.filter((entry) => entry.name);
   };
   // The answer of the server to the palette that has just been opened.

@@ -55,10 +55,12 @@ class ProgramMarks:
             self._placed = draft, state.model
             self._points = _positions(draft, state.model)
         special = {
-            key: color for key, color in ((program.selected, _CHOSEN), (program.failed, _FAILED)) if key in self._points
+            key: color
+            for key, color in ((program.selected, _CHOSEN), (program.failed, _FAILED))
+            if key is not None and key in self._points
         }
         self._show_points(special, is_moved)
-        names = {key: text("program.mark", number=self._points[key][0]) for key in special if key is not None}
+        names = {key: text("program.mark", number=self._points[key][0]) for key in special}
         numbers = [
             (number, f"{number} !" if key == program.failed else names.get(key, ""))
             for key, (number, _) in self._points.items()
@@ -66,7 +68,7 @@ class ProgramMarks:
         points = [position for _, position in self._points.values()]
         self._show_labels([(points[group[0]], sentence) for group, sentence in labels_of(points, numbers)])
 
-    def _show_points(self, special: dict[int | None, tuple[int, int, int]], is_moved: bool) -> None:
+    def _show_points(self, special: dict[int, tuple[int, int, int]], is_moved: bool) -> None:
         """Draws all points, which are sent again only when they have moved, and on them those that stand out."""
         for handle in self._clouds[0 if is_moved else 1 :]:
             handle.remove()
@@ -77,7 +79,7 @@ class ProgramMarks:
             places = np.array([position for _, position in self._points.values()], dtype=np.float32)
             self._clouds.append(self._cloud("points", places, np.array(_PLAIN, dtype=np.uint8), _SIZE))
         if special:
-            places = np.array([self._points[key][1] for key in special if key is not None], dtype=np.float32)
+            places = np.array([self._points[key][1] for key in special], dtype=np.float32)
             self._clouds.append(
                 self._cloud("marked", places, np.array(list(special.values()), dtype=np.uint8), _LARGER)
             )
