@@ -58,6 +58,8 @@ class Plan:
     """How far from the target it ends, as a message; None if it reaches the target."""
     program: Program | None = None
     """The program of the motion, in base; None if it leads to the goal."""
+    steps: tuple[int, ...] = ()
+    """Number of the program's step, from 1, of each segment of a round."""
     frames: Mapping[str, Pose] = field(default_factory=dict[str, Pose])
     """Pose in base of each frame that waypoints of the program are in."""
     mode: Mode = "joint_position"

@@ -12,6 +12,7 @@ from typing import Protocol, TypeVar
 
 from rcilab.cell.cell_storage import load_cell, save_cell
 from rcilab.cell.entries import WORLD, Frame, Obstacle, Signal
+from rcilab.cell.program_signals import resolve_signals
 from rcilab.cell.shapes import LARGEST, Solid
 from rcilab.cell.tool import Part, Tool, require_name
 from rcilab.core.arrays import as_number, described
@@ -20,6 +21,7 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import IDENTITY, Pose, as_pose
 from rcilab.model.dynamics.payload import NO_LOAD, combine_payloads
 from rcilab.model.robot_model import RobotModel, require_model
+from rcilab.motion.program import Program
 from rcilab.robots import describe_robot
 
 MOST = 1000
@@ -127,6 +129,15 @@ class Cell:
         for frame in self.frames:
             poses[frame.name] = poses[frame.parent] @ frame.T_parent_frame
         return poses
+
+    def resolve(self, program: Program) -> Program:
+        """Returns a program with its waypoints in base, and with numbers for the names of its signals.
+
+        Raises:
+            InvalidValueError: A waypoint is in a frame, or a step has a signal, that the cell does not have, or the
+                cell's tool has no jaws or no output for them.
+        """
+        return resolve_signals(program.resolved(self.frame_poses), self.signals, self.tool)
 
     def solid(self, name: str) -> Solid:
         """Returns an obstacle as a solid in the base frame of the arm.

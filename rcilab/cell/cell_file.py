@@ -198,7 +198,7 @@ class _Reader:
         return self._build(lambda: Tool(**values), node, found, "tool")
 
     def _jaws(self, node: Node) -> Jaws:
-        found = read_object(node, self._name, "jaws", ("open", "closed", "finger"))
+        found = read_object(node, self._name, "jaws", ("open", "closed", "finger", "signal"))
         if "open" not in found:
             raise self._missing(node, "jaws", "open")
         values: dict[str, Any] = {
@@ -206,6 +206,8 @@ class _Reader:
         }
         if "finger" in found:
             values["finger"] = self._solids(found["finger"], "finger")
+        if "signal" in found:
+            values["signal"] = read_text(self._name, found["signal"], "jaws, signal")
         return self._build(lambda: Jaws(**values), node, found, "jaws")
 
     def _carried(self, node: Node, found: dict[str, Node], what: str) -> dict[str, Any]:
@@ -317,7 +319,8 @@ def _tool(tool: Tool, name_mesh: MeshNames) -> dict[str, Any]:
         found["solids"] = _solids(tool.solids, name_mesh)
     if tool.jaws is not None:
         jaws: dict[str, Any] = {"open": tool.jaws.open, "closed": tool.jaws.closed}
-        found["jaws"] = jaws | ({"finger": _solids(tool.jaws.finger, name_mesh)} if tool.jaws.finger else {})
+        jaws |= {"finger": _solids(tool.jaws.finger, name_mesh)} if tool.jaws.finger else {}
+        found["jaws"] = jaws | ({"signal": tool.jaws.signal} if tool.jaws.signal else {})
     return found
 
 

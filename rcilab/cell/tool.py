@@ -30,6 +30,8 @@ class Jaws:
     """Distance when closed, [m]."""
     finger: tuple[Solid, ...] = ()
     """The finger on the side of positive y with the jaws closed to 0, in the tool frame; the other is its mirror."""
+    signal: str = ""
+    """Name of the output that closes them; empty without one."""
 
     def __post_init__(self) -> None:
         for name in ("open", "closed"):
@@ -38,6 +40,8 @@ class Jaws:
             problem = f"must be above the closed width, {self.closed:g} m, and at most {WIDEST:g} m"
             raise InvalidValueError("open", self.open, problem)
         object.__setattr__(self, "finger", require_solids(self.finger, "finger"))
+        if self.signal:
+            object.__setattr__(self, "signal", require_name(self.signal, "signal"))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

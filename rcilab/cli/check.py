@@ -137,7 +137,7 @@ def _check(subject: _Subject, args: Namespace, show_note: Callable[[str], None])
 
     found, model, box, mode, cell = subject.found, subject.model, subject.box, subject.mode, subject.cell
     if not isinstance(found, Run):
-        motion = as_motion(found, model, args.file, show=show_note, max_rows=args.max_rows)
+        motion = as_motion(found, model, args.file, show=show_note, max_rows=args.max_rows, cell=cell)
         report = check(motion, model, box=box, cell=cell, mode=mode)
         return report, report
     report = check_sent(found, model, box=box, mode=mode, cell=cell)

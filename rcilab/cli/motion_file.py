@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from argparse import ArgumentParser
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,19 +64,25 @@ def resolved(found: Motion | Program, cell: Cell | None, file: Path) -> Motion |
     """
     from rcilab.motion import Program
 
-    if not isinstance(found, Program) or not found.frames:
+    if not isinstance(found, Program) or not found.needs_cell:
         return found
     if cell is None:
-        raise UsageError(
-            f"{file.name} has waypoints in frames ({', '.join(found.frames)}): add --cell CELL, the cell that has them"
-        )
+        raise UsageError(f"{file.name} needs its cell ({_needs(found)}): add --cell CELL, the cell that has them")
     try:
-        return found.resolved(cell.frame_poses)
+        return cell.resolve(found)
     except InvalidValueError as error:
         number = error.facts["number"]
         assert isinstance(number, int)  # The error names a waypoint.
         line = _line_of(number, file)
         raise InvalidValueError(f"{file.name}, line {line}, {error.name}", error.value, error.requirement) from error
+
+
+def _needs(program: Program) -> str:
+    """Returns what a program takes from its cell."""
+    signals = [step.signal for step in program.waypoints if isinstance(step.signal, str)]
+    kinds = {step.type for step in program.waypoints}
+    others = [name for kind, name in (("tool", "jaws"), ("free", "obstacles")) if kind in kinds]
+    return ", ".join(dict.fromkeys((*program.frames, *signals, *others)))
 
 
 def as_motion(
@@ -84,6 +91,7 @@ def as_motion(
     file: Path,
     show: Callable[[str], None] = print,
     max_rows: int = DEFAULT_MAX_ROWS,
+    cell: Cell | None = None,
 ) -> Motion:
     """Returns the motion and shows its notes; a program is planned.
 
@@ -93,17 +101,20 @@ def as_motion(
         file: Its file, for the line of a waypoint that cannot be planned.
         show: Called with every line of text.
         max_rows: Largest number of 1 ms cycles.
+        cell: The cell that motions lead around.
 
     Raises:
         PlanningError: The program cannot be planned.
         InvalidValueError: It is for another arm.
     """
+    from rcilab.cell.plan_free import plan_free
     from rcilab.core.errors import PlanningError
     from rcilab.motion import Program, plan_program
 
     if isinstance(found, Program):
         try:
-            motion = plan_program(model, found, law="torque_rate_limited", max_rows=max_rows)
+            free = None if cell is None else partial(plan_free, cell=cell)
+            motion = plan_program(model, found, law="torque_rate_limited", max_rows=max_rows, free=free)
         except PlanningError as error:
             if error.waypoint is None:
                 raise

@@ -185,7 +185,7 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
     with _connect(args, model, cell, show_note) as robot:
         if box is not None and args.apply:
             robot.set_safety_box(box)
-        motion = as_motion(found, robot.model, args.file, show=show_note, max_rows=args.max_rows)
+        motion = as_motion(found, robot.model, args.file, show=show_note, max_rows=args.max_rows, cell=cell)
         state = robot.state
         if motion.n != robot.model.n:
             raise UsageError(

@@ -38,14 +38,14 @@ from rcilab.core.errors import UsageError, VersionMismatchError
 from rcilab.core.shared_memory import PAGE, open_shared_memory, whole_pages
 
 MAGIC = b"RCILABCP"
-VERSION = 11  # Increment with every change of this file, of the snapshot or of `cycle_dtype`.
+VERSION = 12  # Increment with every change of this file, of the snapshot or of `cycle_dtype`.
 
 RING_CYCLES = 32768  # 33 s: the longest time between two reads without a loss.
 MOTION_TIME = 300.0  # [s] Longest motion that fits into the block.
 MOTION_ROWS = round(MOTION_TIME / CYCLE_TIME) + 1
 OPERATOR_TIMEOUT = 2.0  # [s] A motion ends after this time without an operator (workbench: control lock).
 MESSAGE_SLOTS = 16
-MESSAGE_SIZE = 4096  # [bytes] The largest request, a configuration, needs 1300.
+MESSAGE_SIZE = 32768  # [bytes] The largest request, a motion with 500 events, needs 22 000.
 
 _HEADER = struct.Struct("<8sIIIIQ")  # magic, version, n, size of a cycle, ring capacity, total size
 _SETTINGS_SIZE = 4 * PAGE
@@ -81,6 +81,8 @@ class Counter(IntEnum):
     """Supervisor: sequence number, odd while the jog is being written."""
     JOG_HEARTBEAT = 12
     """Supervisor: monotonic time when a jog was last held, [ns]; 0 after its release."""
+    MOTION_CYCLE = 13
+    """Control process: newest cycle of the motion in progress, in which waits for inputs do not count."""
 
 
 class ControlBlock:

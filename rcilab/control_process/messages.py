@@ -18,6 +18,8 @@ from rcilab.core.spatial import Pose
 from rcilab.core.state import Mode
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace
+from rcilab.motion.motion_event import CycleEvent
+from rcilab.motion.speed_scaling import Shift
 
 _OVERHEAD = 256  # [bytes] Of a reply, in addition to its error.
 _MAX_TEXT = 1000  # Characters; longer texts are cut.
@@ -108,6 +110,8 @@ class Execute:
     duration: float
     """[s]"""
     mode: Mode
+    events: tuple[CycleEvent, ...] = ()
+    """What happens on the way."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,6 +127,8 @@ class SwitchRows:
     """Whether the arm waits at the last row."""
     duration: float
     """New duration of the motion, [s]."""
+    events: tuple[CycleEvent, ...] = ()
+    """All events of the motion, with their new cycles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +164,8 @@ class Reply:
     error: RcilabError | None = None
     reported: RobotConfiguration | None = None
     """What the controller reports of its configuration, after it was connected or configured."""
+    shifts: tuple[Shift, ...] = ()
+    """Where a motion waited or left cycles out."""
 
 
 def as_sendable(error: Exception) -> RcilabError:

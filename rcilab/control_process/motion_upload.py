@@ -16,8 +16,10 @@ from rcilab.core.arrays import JointVector
 from rcilab.core.errors import CertificateError, PlanningError, RcilabError, UsageError
 from rcilab.core.state import Mode, require_mode
 from rcilab.execution.command_validation import find_start_mismatch
+from rcilab.makers.driver import require_signals
 from rcilab.makers.maker import commanded_start, start_tolerance_of
 from rcilab.motion import Motion, require_motion
+from rcilab.motion.motion_event import cycle_events
 from rcilab.motion.speed_scaling import SpeedScaledMotion
 
 if TYPE_CHECKING:
@@ -55,6 +57,7 @@ def require_admissible(
     require_motion(motion)
     require_certificate(certificate)
     require_mode(mode)
+    require_signals(motion.events, model)
     q_c = require_ready(status, is_operator_overdue=is_operator_overdue)
     q_c = commanded_start(motion.q[0], q_c, model)
     if certificate is None:
@@ -159,7 +162,14 @@ class SharedRows:
                 raise _too_long_error(changed)
             self._block.motion[start : start + len(rows)] = rows
             pending = self._send(
-                SwitchRows(first=first, start=start, rows=len(rows), holds=changed.is_held, duration=changed.duration)
+                SwitchRows(
+                    first=first,
+                    start=start,
+                    rows=len(rows),
+                    holds=changed.is_held,
+                    duration=changed.duration,
+                    events=cycle_events(changed),
+                )
             )
             self._last = pending, self._in_use
             self._in_use = [*self._in_use[-2:], _Region(first, start, len(rows))]

@@ -16,6 +16,7 @@ from rcilab.control_process.layout import MESSAGE_SIZE, MESSAGE_SLOTS, ControlBl
 from rcilab.control_process.messages import End, NumberedRequest, Reply, Request, as_sendable
 from rcilab.core.errors import DeadlineError, RcilabError, UsageError
 from rcilab.makers.configuration import RobotConfiguration
+from rcilab.motion.speed_scaling import Shift
 
 _LENGTH = struct.Struct("<I")
 _Message = TypeVar("_Message")
@@ -86,6 +87,8 @@ class PendingRequest:
         self._error: RcilabError | None = None
         self.reported: RobotConfiguration | None = None
         """See `Reply`."""
+        self.shifts: tuple[Shift, ...] = ()
+        """See `Reply`."""
 
     @property
     def done(self) -> bool:
@@ -115,10 +118,15 @@ class PendingRequest:
         if self._error is not None:
             raise self._error
 
-    def settle(self, error: RcilabError | None = None, reported: RobotConfiguration | None = None) -> None:
+    def settle(
+        self,
+        error: RcilabError | None = None,
+        reported: RobotConfiguration | None = None,
+        shifts: tuple[Shift, ...] = (),
+    ) -> None:
         """Marks it done; called by the supervisor. Only the first call has an effect."""
         if not self._event.is_set():
-            self._error, self.reported = error, reported
+            self._error, self.reported, self.shifts = error, reported, shifts
             self._event.set()
 
     def __repr__(self) -> str:
@@ -160,10 +168,17 @@ class RequestChannel:
         self._deferred.append(request)
 
     def answer(
-        self, request: NumberedRequest, error: Exception | None = None, reported: RobotConfiguration | None = None
+        self,
+        request: NumberedRequest,
+        error: Exception | None = None,
+        reported: RobotConfiguration | None = None,
+        shifts: tuple[Shift, ...] = (),
     ) -> None:
-        """Sends the reply to a request: success, with what the controller reports after it, or the error."""
-        self._replies.post(Reply(request.id, None if error is None else as_sendable(error), reported))
+        """Sends the reply to a request: success, with what the controller reports after it, or the error.
+
+        `shifts`: see `Reply`.
+        """
+        self._replies.post(Reply(request.id, None if error is None else as_sendable(error), reported, shifts))
 
 
 class RequestClient:
@@ -210,7 +225,7 @@ class RequestClient:
         while (reply := self._replies.pop()) is not None:
             pending = self._pending.pop(reply.id, None)
             if pending is not None:
-                pending.settle(reply.error, reply.reported)
+                pending.settle(reply.error, reply.reported, reply.shifts)
             if reply.error is not None:
                 errors.append(reply.error)
         return errors

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rcilab.control_process.layout import Counter
 from rcilab.control_process.status import PHASES, Phase
 
-_RECORD = struct.Struct("<BbBBqIIddd96s1024s")
+_RECORD = struct.Struct("<BbBBqIIiddd96s1024s")
 _ATTEMPTS = 1000  # The writer needs about 3 us; more failures mean that it ended while writing.
 
 
@@ -28,6 +28,8 @@ class Snapshot:
     """Digital outputs that were set on this connection, one bit each: a controller does not report them."""
     outputs: int = 0
     """Levels of these outputs, one bit each."""
+    awaited: int = -1
+    """Number of the digital input that the motion waits for; -1: none."""
     rate_hz: float = 0.0
     motion_time: float | None = None
     motion_duration: float | None = None
@@ -47,6 +49,7 @@ def write_snapshot(memory: memoryview, counters: memoryview, snapshot: Snapshot)
         snapshot.inputs,
         snapshot.outputs_known,
         snapshot.outputs,
+        snapshot.awaited,
         snapshot.rate_hz,
         -1.0 if snapshot.motion_time is None else snapshot.motion_time,
         -1.0 if snapshot.motion_duration is None else snapshot.motion_duration,
@@ -65,7 +68,8 @@ def read_snapshot(memory: memoryview, counters: memoryview) -> Snapshot:
         if before % 2 == 0 and counters[Counter.SNAPSHOT] == before:
             break
     facts = _RECORD.unpack(data)
-    phase, powered, is_fifo, locked, inputs, outputs_known, outputs, rate_hz, time, duration, code, message = facts
+    phase, powered, is_fifo, locked, inputs, outputs_known, outputs, awaited, *timing, code, message = facts
+    rate_hz, time, duration = timing
     return Snapshot(
         phase=PHASES[phase] if phase < len(PHASES) else "starting",
         code=_text(code),
@@ -76,6 +80,7 @@ def read_snapshot(memory: memoryview, counters: memoryview) -> Snapshot:
         inputs=inputs,
         outputs_known=outputs_known,
         outputs=outputs,
+        awaited=awaited,
         rate_hz=rate_hz,
         motion_time=None if time < 0.0 else time,
         motion_duration=None if duration < 0.0 else duration,

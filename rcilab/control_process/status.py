@@ -150,6 +150,8 @@ class SupervisorStatus:
     """Levels of the digital inputs when last read; None: not read on this connection."""
     outputs: tuple[bool | None, ...] = ()
     """Levels of the digital outputs as set on this connection; None: not set (a controller does not report them)."""
+    awaited: int | None = None
+    """Number of the digital input that the motion waits for; None: none."""
     success_rate: float = 0.0
     """Share of commands that arrived in time, as the controller reports it, 0 to 1."""
     rate_hz: float = 0.0

@@ -57,6 +57,7 @@ class StatusReader:
             "outputs": tuple(
                 bool(shown.outputs >> bit & 1) if shown.outputs_known >> bit & 1 else None for bit in self._outputs
             ),
+            "awaited": None if shown.awaited < 0 else shown.awaited,
             "rate_hz": shown.rate_hz,
             "scheduling": "SCHED_FIFO" if shown.is_fifo else "normal",
             "memory_locked": shown.memory_locked,
@@ -69,10 +70,8 @@ class StatusReader:
         }
 
     def read_cycle(self) -> int:
-        """Returns the newest cycle of the motion in progress; 0 before its first."""
-        row = self._ring.newest()
-        t = 0.0 if row is None else float(row["t"][0])
-        return round(t / CYCLE_TIME) if t == t else 0  # NaN outside a motion.
+        """Returns the newest cycle of the motion in progress, without its waits for inputs; 0 before its first."""
+        return int(self._block.counters[Counter.MOTION_CYCLE])
 
     def _read_arm(self) -> dict[str, Any]:
         row = self._ring.newest()

@@ -91,13 +91,26 @@ class StatusWriter:
 
     def end_motion(self) -> None:
         """Writes the final time of a motion with a duration."""
+        self.await_input(None)
         if self.snapshot.motion_duration is not None:
             self.update(motion_time=self._motion_cycle * CYCLE_TIME)
 
     def begin_motion(self, duration: float | None) -> None:
         """Writes the duration of a motion that begins, [s]; None: it has none, such as a jog."""
-        self._motion_cycle = 0
-        self.update(motion_time=None if duration is None else 0.0, motion_duration=duration)
+        self.on_cycle(0)
+        self.update(awaited=-1, motion_time=None if duration is None else 0.0, motion_duration=duration)
+
+    def await_input(self, signal: int | None) -> None:
+        """Writes which input the motion waits for; None: none."""
+        awaited = -1 if signal is None else signal
+        if awaited != self.snapshot.awaited:
+            self.update(awaited=awaited)
+
+    def set_output(self, signal: int, level: bool) -> None:
+        """Writes the level of a digital output that was set."""
+        bit, shown = 1 << signal, self.snapshot
+        outputs = shown.outputs | bit if level else shown.outputs & ~bit
+        self.update(outputs_known=shown.outputs_known | bit, outputs=outputs)
 
     def write_tool(self, T_flange_tool: Pose) -> None:
         """Writes the tool that follows from the poses that the controller reports."""
@@ -105,4 +118,4 @@ class StatusWriter:
 
     def on_cycle(self, cycle: int) -> None:
         """Stores the present cycle of the motion."""
-        self._motion_cycle = cycle
+        self._motion_cycle = self._counters[Counter.MOTION_CYCLE] = cycle

@@ -49,6 +49,7 @@ from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace, parse_address, require_signal
 from rcilab.makers.maker import capabilities_of, require_driver, require_feature, require_parts
 from rcilab.model.robot_model import require_model
+from rcilab.motion.motion_event import cycle_events
 from rcilab.motion.speed_scaling import SpeedScaledMotion, require_speed_override
 from rcilab.sim.controller_config import require_plant
 
@@ -105,6 +106,7 @@ class Supervisor(Closeable):
         self._monitor = ProcessMonitor(plant, address, self._setup, auto_restart=auto_restart, cell=cell)
         self._lock = self._monitor.lock
         self._stop_without_operator = stop_without_operator
+        self._executing: PendingRequest | None = None  # The last motion.
         self._jogging: PendingRequest | None = None
 
     def start(self, timeout: float = 20.0) -> None:
@@ -279,7 +281,11 @@ class Supervisor(Closeable):
             self._rows.begin(scaled)
             self._override.begin(scaled, self.model, mode)
             duration = scaled.duration if scaled.changed else motion.duration  # A plan may end within a cycle.
-            return self._send("execute", Execute(rows=len(scaled.q), duration=duration, mode=mode))
+            events = cycle_events(scaled)
+            self._executing = self._send(
+                "execute", Execute(rows=len(scaled.q), duration=duration, mode=mode, events=events)
+            )
+            return self._executing
 
     def pause(self) -> PendingRequest:
         """Holds the motion in progress, on its path and within all limits; done once the control process has the rows.
@@ -317,7 +323,8 @@ class Supervisor(Closeable):
         """The motion of the last `execute` as commanded, with every change of speed; None before the first."""
         with self._lock:
             self._require_block()
-            return self._override.motion
+            scaled, request = self._override.motion, self._executing
+            return scaled if scaled is None or request is None else scaled.shifted(request.shifts)
 
     def _override_of_motion(self) -> SpeedOverride[PendingRequest]:
         with self._lock:

@@ -52,6 +52,7 @@ from rcilab.execution.command_validation import find_start_mismatch
 from rcilab.execution.control_loop import Callback
 from rcilab.execution.guiding import HandGuide
 from rcilab.execution.jog import JogCallback
+from rcilab.execution.motion_events import EventQueue, SignalListener
 from rcilab.execution.motion_executor import HELD_TOO_LONG, LONGEST_PAUSE, MotionExecutor, MotionStream
 from rcilab.execution.recorder import CycleLog
 from rcilab.makers.configuration import RobotConfiguration
@@ -59,11 +60,14 @@ from rcilab.makers.driver import StreamingDriver, open_driver
 from rcilab.makers.maker import capabilities_of, start_tolerance_of, timing_of
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import plan_stop
+from rcilab.motion.speed_scaling import Shift
 from rcilab.realtime.cpu_latency import awake_cores
 from rcilab.realtime.scheduling import enter_realtime, loop_priority
 
 IDLE_STATE_TIMEOUT = 0.3  # [s] Without a state while idle until the connection counts as lost; a page waits 0.5 s.
 _POLL_PERIOD = 0.02  # [s] Longest wait in the idle loop, and time between two checks for the supervisor.
+MOST_SHIFTS = 1000
+"""Largest number of waits of a motion that fit into the reply."""
 _IDLE_PERIOD = 0.004  # [s] Between two polls for states while nothing moves; saves CPU time.
 
 
@@ -210,7 +214,7 @@ class ControlProcess:
                 self._report_failure(request, error)
                 raise
             else:
-                self._requests.answer(request, reported=reported)
+                self._requests.answer(request, reported=reported, shifts=self._motions.pop_shifts())
 
     def _handle(self, request: Request) -> RobotConfiguration | None:
         """Handles a request; returns what the controller reports of its configuration, if that may have changed."""
@@ -259,7 +263,7 @@ class ControlProcess:
             self._report_fault(error.faults)
         elif self._driver is not None and self._guide is None:
             self._status.set_phase("idle", "idle.failed", error=str(error))
-        self._requests.answer(request, error)
+        self._requests.answer(request, error, shifts=self._motions.pop_shifts())
 
     def _handle_loss(self, error: Exception) -> None:
         """Closes the connection and reports why."""
@@ -298,11 +302,8 @@ class ControlProcess:
         self._report_ready()
 
     def _set_output(self, signal: int, level: bool) -> None:
-        bit = 1 << signal
         self._require_driver().set_output(signal, level)
-        shown = self._status.snapshot
-        outputs = shown.outputs | bit if level else shown.outputs & ~bit
-        self._status.update(outputs_known=shown.outputs_known | bit, outputs=outputs)
+        self._status.set_output(signal, level)
         self._read_inputs()  # An output may be wired to an input.
 
     def _read_inputs(self) -> None:
@@ -415,6 +416,7 @@ class MotionService:
         self._jog: JogCallback | None = None
         self._is_stopping = False
         self._stream: MotionStream | None = None
+        self._shifts: tuple[Shift, ...] = ()
 
     def execute(self, driver: StreamingDriver, model: RobotModel, request: Execute) -> None:
         """Streams the rows in the block; returns once the arm is stationary at their end.
@@ -433,11 +435,22 @@ class MotionService:
             model.rigid_body.motion_torque(driver.latest.q, driver.latest.dq, driver.latest.dq)  # Warm-up.
         self._status.begin_motion(request.duration)
         self._status.set_phase("moving", "moving")
-        self._stream = MotionStream(rows, mode, model, self._status.on_cycle)
+        events = self._build_events(driver, model, request) if request.events else None
+        self._stream = MotionStream(rows, mode, model, self._status.on_cycle, events)
         try:
             self._move(driver, model, self._stream, "idle.arrived", mode)
         finally:
+            self._shifts = tuple(self._stream.shifts[-MOST_SHIFTS:])
             self._stream = None
+
+    def _build_events(self, driver: StreamingDriver, model: RobotModel, request: Execute) -> EventQueue:
+        listener = SignalListener(self._status.set_output, self._status.await_input)
+        return EventQueue(request.events, driver, capabilities_of(model).inputs, listener)
+
+    def pop_shifts(self) -> tuple[Shift, ...]:
+        """Returns where the last motion waited or left cycles out, once."""
+        shifts, self._shifts = self._shifts, ()
+        return shifts
 
     def jog(self, driver: StreamingDriver, model: RobotModel) -> None:
         """Moves the arm as long as the jog is renewed; returns once the arm is stationary.
@@ -515,7 +528,7 @@ class MotionService:
     def _switch_rows(self, request: NumberedRequest, switch: SwitchRows, stream: MotionStream) -> None:
         """Continues with other rows of the block."""
         rows = self._block.motion[switch.start : switch.start + switch.rows]
-        if stream.switch(switch.first, rows, holds=switch.holds):
+        if stream.switch(switch.first, rows, holds=switch.holds, events=switch.events):
             self._status.update(motion_duration=switch.duration)
             self._status.set_phase("moving", "moving.held" if switch.holds else "moving")
             self._requests.answer(request)

@@ -31,9 +31,12 @@ from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, Mode, RobotState
 from rcilab.execution.control_loop import STATE_TIMEOUT, Callback, ControlLoop, StopCheck
 from rcilab.execution.filters import RateLimiter
+from rcilab.execution.motion_events import EventQueue
 from rcilab.execution.recorder import CycleLog
 from rcilab.makers.driver import StreamingDriver
 from rcilab.motion import plan_stop
+from rcilab.motion.motion_event import CycleEvent
+from rcilab.motion.speed_scaling import Shift
 
 if TYPE_CHECKING:
     from rcilab.core.safety_box import SafetyBox
@@ -159,13 +162,22 @@ class MotionStream:
         rows: Joint angles, shape (N, n), [rad].
         mode: Command mode.
         model: The arm, with its tool and load.
-        on_cycle: Called with the number of every cycle.
+        on_cycle: Called with the number of every cycle of the motion.
+        events: What happens on the way.
     """
 
     def __init__(
-        self, rows: JointPath, mode: Mode, model: RobotModel, on_cycle: Callable[[int], None] | None = None
+        self,
+        rows: JointPath,
+        mode: Mode,
+        model: RobotModel,
+        on_cycle: Callable[[int], None] | None = None,
+        events: EventQueue | None = None,
     ) -> None:
         self._rows = rows
+        self._events = events
+        self._ahead = 0  # Cycles of the motion that were left out, less those of waits.
+        self._was_waiting = False
         self._first = 0  # Cycle of row 0.
         self._holds = False
         self._next: tuple[int, JointPath, bool] | None = None
@@ -175,13 +187,15 @@ class MotionStream:
         self._settling = SETTLING if mode == "torque" else 0
         self._on_cycle = on_cycle
         self.cycle = 0
-        """Cycle of the newest command."""
+        """Cycle of the motion of the newest command: waits do not count."""
+        self.shifts: list[Shift] = []
+        """Where the motion waited for an input or left cycles out."""
         self.held = 0
         """Number of cycles for which the arm has been held; 0: it moves."""
 
     def __call__(self, state: RobotState, t: float) -> Command:
         """Returns the command that answers a state."""
-        cycle = self.cycle = round(t / CYCLE_TIME)
+        cycle = self.cycle = self._advance(round(t / CYCLE_TIME))
         if self._next is not None and cycle >= self._next[0]:
             self._first, self._rows, self._holds = self._next
             self._next = None
@@ -192,6 +206,7 @@ class MotionStream:
         # With further rows to follow, the arm is held at the last one.
         self.held = row - last if row > last and (self._holds or self._next is not None) else 0
         is_over = not self._holds and self._next is None and row >= last + self._settling
+        is_over = is_over and (self._events is None or self._events.is_settled)
         command = self._command(rows, row, state)
         return replace(command, finished=True) if is_over else command
 
@@ -200,17 +215,34 @@ class MotionStream:
         if self._mode.startswith("cartesian"):
             self._command = _poses(self._model, has_psi=False)
 
-    def switch(self, first: int, rows: JointPath, *, holds: bool) -> bool:
+    def _advance(self, now: int) -> int:
+        """Returns the motion's cycle in a controller cycle, after the events up to it."""
+        if self._events is None:
+            return now
+        cycle = now + self._ahead
+        reached = self._events.advance(cycle, now)
+        is_waiting = self._events.is_waiting
+        if reached != cycle or is_waiting != self._was_waiting:
+            self._ahead = reached - now
+            if is_waiting != self._was_waiting or not is_waiting:
+                self.shifts.append(Shift(now, reached, is_waiting))
+            self._was_waiting = is_waiting
+        return reached
+
+    def switch(self, first: int, rows: JointPath, *, holds: bool, events: Sequence[CycleEvent] = ()) -> bool:
         """Replaces the following rows; returns False, without effect, if they do not continue the stream.
 
         Args:
-            first: Cycle of their first row, in the future; they must continue the present rows.
+            first: Cycle of the motion of their first row, in the future; they must continue the present rows.
             rows: Shape (N, n), [rad].
             holds: Whether the arm is held in the last row, before the goal.
+            events: All events of the motion, with the cycles that they have then.
         """
         if first <= self.cycle + 1 or not self._continues_stream(first, rows):
             return False
         self._next = (first, rows, holds)
+        if self._events is not None:
+            self._events.exchange(events)
         return True
 
     def _continues_stream(self, first: int, rows: JointPath) -> bool:

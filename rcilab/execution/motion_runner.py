@@ -15,7 +15,7 @@ from rcilab.core.cycle_recorder import RECORD_TIME, Recorder
 from rcilab.core.errors import RecordedError
 from rcilab.core.state import Mode, RobotState
 from rcilab.execution.control_loop import Callback
-from rcilab.execution.motion_executor import MotionExecutor
+from rcilab.execution.motion_executor import MotionExecutor, MotionStream
 from rcilab.execution.recorder import CycleLog
 from rcilab.execution.session_lock import SessionLock
 from rcilab.execution.speed_override import SpeedOverride
@@ -150,6 +150,8 @@ class MotionRunner:
 
         def report(stopped: str | None, error: BaseException | None = None) -> Run:
             scaled = None if override is None else override.motion
+            if scaled is not None and isinstance(callback, MotionStream):
+                scaled = scaled.shifted(callback.shifts)
             run = build_run(
                 recorder.rows(),
                 plan=plan if scaled is None else scaled.as_motion(),

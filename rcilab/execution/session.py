@@ -26,6 +26,7 @@ from rcilab.core.state import Mode, RobotState, require_mode
 from rcilab.execution.command_validation import find_start_mismatch
 from rcilab.execution.control_loop import Callback
 from rcilab.execution.filters import LowPass, RateLimiter
+from rcilab.execution.motion_events import EventQueue
 from rcilab.execution.motion_executor import MotionStream
 from rcilab.execution.motion_runner import (
     MotionProgress,
@@ -44,6 +45,7 @@ from rcilab.makers.driver import (
     ConfiguredArm,
     StreamingDriver,
     require_signal,
+    require_signals,
     require_timeout,
 )
 from rcilab.makers.maker import (
@@ -60,6 +62,7 @@ from rcilab.model.dynamics.payload import POINT_MASS
 from rcilab.motion import Motion, plan_joint, require_motion
 from rcilab.motion.cartesian import arm_angles, follow_path, schedule
 from rcilab.motion.joint import DEFAULT_SPEED, S_PROFILE_VELOCITY, JointLaw
+from rcilab.motion.motion_event import cycle_events
 from rcilab.motion.path import build_arc, build_line
 from rcilab.motion.speed_scaling import require_speed_override
 from rcilab.recording.run import Run
@@ -389,7 +392,11 @@ class RobotSession(Closeable):
             motion = resulting_motion(motion, self.model, mode)
             scaled = plan_start_with_override(motion, speed_override, self.model, mode)
             planned = scaled.as_motion()
-            stream = MotionStream(scaled.q, mode, self.model, report_progress(planned, progress))
+            events = None
+            if motion.events:
+                require_signals(motion.events, self.model)
+                events = EventQueue(cycle_events(scaled), self._driver, capabilities_of(self.model).inputs)
+            stream = MotionStream(scaled.q, mode, self.model, report_progress(planned, progress), events)
             override = SpeedOverride(StreamRows(stream))
             override.begin(scaled, self.model, mode)
             self._streamed = stream, override

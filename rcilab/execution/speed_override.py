@@ -9,6 +9,7 @@ from rcilab.conformance.speed_scaling_check import plan_speed_override
 from rcilab.core.errors import UsageError
 from rcilab.core.state import Mode
 from rcilab.execution.motion_executor import MotionStream
+from rcilab.motion.motion_event import cycle_events
 from rcilab.motion.speed_scaling import SpeedScaledMotion
 
 if TYPE_CHECKING:
@@ -56,7 +57,8 @@ class StreamRows:
 
     def switch(self, first: int, changed: SpeedScaledMotion) -> bool | None:
         """Continues with the rows of a changed motion; returns None if it is too late."""
-        return self._stream.switch(first, changed.q[first:], holds=changed.is_held) or None
+        events = cycle_events(changed)
+        return self._stream.switch(first, changed.q[first:], holds=changed.is_held, events=events) or None
 
     def was_refused(self) -> bool:
         """Returns False: a stream decides at once."""

@@ -13,18 +13,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from rcilab.core.arrays import JointVector, described
 from rcilab.core.command import Command, CommandFilter
-from rcilab.core.errors import ConnectionLostError, DeadlineError, InvalidValueError
+from rcilab.core.errors import ConnectionLostError, DeadlineError, InvalidValueError, UsageError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode, RobotState
 from rcilab.i18n.translator import Remark
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.makers.maker import Maker, all_makers
+from rcilab.makers.maker import Maker, all_makers, capabilities_of
 from rcilab.robots import DhRow
 
 if TYPE_CHECKING:
     from rcilab.cell.cell import Cell
     from rcilab.model.robot_model import RobotModel
+    from rcilab.motion.motion_event import MotionEvent
 
 GuideSpace: TypeAlias = Literal["joint", "cartesian"]
 """Space of the constraints of hand guiding; in joint space they have no effect."""
@@ -250,8 +251,30 @@ class Driver(Protocol):
         ...
 
 
+class SignalRequest(Protocol):
+    """A request for a digital signal that was sent during a motion."""
+
+    def poll(self) -> bool | None:
+        """Returns the level of an input, True for an output that is set, or None until the answer; never waits.
+
+        Raises:
+            CommandRejectedError: The controller refuses.
+            ConnectionLostError: The connection is lost.
+        """
+        ...
+
+
 class StreamingDriver(Driver, Protocol):
     """A driver that sends a command for every state."""
+
+    def ask_signal(self, signal: int, level: bool | None = None) -> SignalRequest:
+        """Sends a request for an input, or sets an output to a level; during a motion, and never waits.
+
+        Raises:
+            InvalidValueError: There is no such signal.
+            ModelError: The interface has no signals.
+        """
+        ...
 
     def begin(self, mode: ControllerMode) -> None:
         """Asks the controller to start a motion in a mode."""
@@ -363,6 +386,29 @@ def parse_address(address: str, model: RobotModel | None = None) -> RobotAddress
         InvalidValueError: It is not a valid address, or that of another maker's controller.
     """
     return _maker_at(address, None if model is None else model.description.maker).parse_address(address)
+
+
+def require_signals(events: Sequence[MotionEvent], model: RobotModel) -> None:
+    """Requires that the arm's controller has the digital signals of a motion's events.
+
+    Raises:
+        UsageError: It has not.
+    """
+    has = capabilities_of(model)
+    for event in events:
+        kind = "output" if event.kind == "output" else "input"
+        names = has.outputs if kind == "output" else has.inputs
+        if event.signal >= len(names):
+            there = f"there are {kind}s 0 to {len(names) - 1}" if names else f"its interface has no digital {kind}s"
+            step = f"step {event.row}: " if event.row else ""
+            raise UsageError(f"{step}{kind} {event.signal} of {model.name} does not exist; {there}").coded(
+                "no_such_signal",
+                number=event.row,
+                kind=kind,
+                signal=event.signal,
+                model=model.name,
+                last=len(names) - 1,
+            )
 
 
 def require_signal(signal: object, names: Sequence[str]) -> int:

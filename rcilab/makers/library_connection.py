@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import Any, Generic, Protocol, TypeVar
 
 from rcilab.core.state import RobotState
@@ -108,6 +108,10 @@ class LibraryConnection(ABC, Generic[Report]):
             self.on_states(self.poll(0.0))
         return answer.result()
 
+    def post(self, call: Callable[..., Any], *arguments: Any, **options: Any) -> PostedCall:
+        """Calls the library in its own thread, and never waits."""
+        return PostedCall(self._asker.submit(call, *arguments, **options))
+
     def close(self) -> None:
         """Ends the connection. May be called twice."""
         self._reports.close()
@@ -115,6 +119,25 @@ class LibraryConnection(ABC, Generic[Report]):
 
     @abstractmethod
     def _read(self, report: Report) -> RobotState: ...
+
+
+class PostedCall:
+    """A call of the library for a digital signal, a `SignalRequest`.
+
+    Args:
+        answer: Its result.
+    """
+
+    def __init__(self, answer: Future[Any], read: Callable[[Any], bool] = lambda answer: True) -> None:
+        self._answer, self._read = answer, read
+
+    def reading(self, read: Callable[[Any], bool]) -> PostedCall:
+        """Returns the same call, with the level that a function finds in the answer."""
+        return PostedCall(self._answer, read)
+
+    def poll(self) -> bool | None:
+        """Returns the level, or None until the answer; never waits."""
+        return self._read(self._answer.result()) if self._answer.done() else None
 
 
 class LibraryDriver(Generic[Report]):

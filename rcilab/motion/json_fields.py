@@ -50,6 +50,13 @@ def read_number(name: str, node: Node, key: str) -> float:
     return node.value
 
 
+def read_flag(name: str, node: Node, key: str) -> bool:
+    """Returns a truth value; arguments as of `read_vector`."""
+    if not isinstance(node.value, bool):
+        raise _wrong_type(name, node, key, "must be true or false")
+    return node.value
+
+
 def read_list(name: str, node: Node, key: str) -> list[Node]:
     """Returns a list; arguments as of `read_vector`."""
     if not isinstance(node.value, list):

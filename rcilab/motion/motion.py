@@ -30,6 +30,7 @@ from rcilab.i18n.catalogue import SHARED
 from rcilab.i18n.notebook_language import language
 from rcilab.i18n.translator import Remark, Text
 from rcilab.motion import storage
+from rcilab.motion.motion_event import MotionEvent, event_rows, require_events
 from rcilab.motion.piecewise import DERIVATIVES, PiecewisePolynomial
 from rcilab.motion.samples import is_on_grid, notes_on, read_samples
 from rcilab.motion.spline import spline_through
@@ -82,6 +83,8 @@ class Motion:
     """Start time of each segment of a program, shape (S,), first 0, [s]; any other motion has one segment."""
     notes: tuple[str, ...] = ()
     """Notes of the planner, one sentence each, such as a blend that had to be shortened."""
+    events: tuple[MotionEvent, ...] = ()
+    """Outputs that are set and inputs that are awaited on the way; waits add to the duration."""
     _cache: dict[str, Array] = field(init=False, repr=False, default_factory=dict[str, Array])
 
     def __post_init__(self) -> None:
@@ -94,6 +97,7 @@ class Motion:
         if starts.ndim != 1 or not starts.size or starts[0] != 0.0 or not (np.diff(starts, append=np.inf) >= 0.0).all():
             raise InvalidValueError("segment_starts", self.segment_starts, "must begin at 0 and never decrease [s]")
         object.__setattr__(self, "segment_starts", starts)
+        object.__setattr__(self, "events", require_events(self.events, self.duration))
         object.__setattr__(self, "notes", tuple(note if isinstance(note, Remark) else str(note) for note in self.notes))
 
     @classmethod
@@ -208,6 +212,8 @@ class Motion:
         for array in (self.polynomial.breaks, self.polynomial.coefficients, self.goal):
             digest.update(repr(array.shape).encode())
             digest.update(np.ascontiguousarray(array).tobytes())
+        if self.events:
+            digest.update(event_rows(self.events).tobytes())
         return digest.hexdigest()
 
     def __len__(self) -> int:
@@ -251,7 +257,8 @@ class Motion:
         if not 1.0 <= factor < math.inf:
             raise InvalidValueError("factor", factor, "must be 1 or more, and finite: the factor on the duration")
         starts = factor * self.segment_starts
-        return replace(self, polynomial=self.polynomial.slowed(factor), segment_starts=starts)
+        events = tuple(event.slowed(factor) for event in self.events)
+        return replace(self, polynomial=self.polynomial.slowed(factor), segment_starts=starts, events=events)
 
     def save(self, file: str | PathLike[str] | BinaryIO) -> None:
         """Writes the motion to a file that `Motion.load` reads; the suffix selects the format.
@@ -316,7 +323,8 @@ class Motion:
         return _through_samples(*read_samples(file, rate_hz, unit, max_rows), max_rows, file)
 
     def __reduce__(self) -> tuple[object, ...]:
-        return _rebuild, (self.polynomial, self.goal, self.law, self.speed, self.segment_starts, self.notes)
+        parts = (self.polynomial, self.goal, self.law, self.speed, self.segment_starts, self.notes, self.events)
+        return _rebuild, parts
 
     def __repr__(self) -> str:
         return f"<Motion {self.law}, {self.n} joints, {self.duration:.3f} s, speed {self.speed:g}>"
@@ -342,6 +350,8 @@ class Motion:
             "segment_starts": self.segment_starts,
             "notes": np.array(self.notes, dtype=np.str_),
         }
+        if self.events:
+            content["events"] = event_rows(self.events)
         storage.write_arrays(stream, content)
 
     def _cached(self, name: str) -> Array:
@@ -430,5 +440,8 @@ def _rebuild(
     speed: float,
     starts: Array,
     notes: tuple[str, ...],
+    events: tuple[MotionEvent, ...],
 ) -> Motion:
-    return Motion(polynomial=polynomial, goal=goal, law=law, speed=speed, segment_starts=starts, notes=notes)
+    return Motion(
+        polynomial=polynomial, goal=goal, law=law, speed=speed, segment_starts=starts, notes=notes, events=events
+    )

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,16 +20,21 @@ from rcilab.i18n.translator import Remark
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.blend import Blend, build_blend
 from rcilab.motion.cartesian import plan_path
-from rcilab.motion.joint import JOINT_LAWS, MIN_SPEED, JointLaw, plan_joint
+from rcilab.motion.joint import DEFAULT_SPEED, JOINT_LAWS, MIN_SPEED, JointLaw, plan_joint
 from rcilab.motion.motion import Motion
+from rcilab.motion.motion_event import MotionEvent
 from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.motion.program import Program
+from rcilab.motion.program_expansion import Expansion, expand
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 from rcilab.motion.segment import Segment, build_segments, naming
 from rcilab.motion.segment_spline import build_segment_spline
 from rcilab.motion.segment_spline_motion import plan_segment_spline
 from rcilab.motion.torque_rate import plan_within_torque_rate
 from rcilab.motion.waypoint import MOST_WAYPOINTS, label, named_value
+
+FreePlanner: TypeAlias = Callable[..., Motion]
+"""`(model, start, goal, *, speed, law) -> motion` from one stationary position to another."""
 
 _NOTED_DIFFERENCE = 1e-6
 """A radius that is shortened by more than this is noted, [m]."""
@@ -48,6 +54,7 @@ def plan_program(
     law: JointLaw = "jerk_limited",
     progress: Callable[[float], None] | None = None,
     max_rows: int = DEFAULT_MAX_ROWS,
+    free: FreePlanner | None = None,
 ) -> Motion:
     """Returns the motion through the waypoints of a program, from standstill to standstill.
 
@@ -55,6 +62,10 @@ def plan_program(
     angle. Joint moves and the blends next to them are inside the limits on joints, as with `plan_joint`. A blend uses
     the lower speed of its two segments. Without blends the motion is the sequence of those of `plan_joint`, `plan_line`
     and so on, each starting at a whole cycle.
+
+    Instructions become `motion.events`, see `rcilab.motion.motion_event`: an output is set where its step is, without a
+    stop; the motion has a short standstill for each wait for an input. Blocks are repeated; an approach is a segment of
+    its own. `expand(program.waypoints)` returns the waypoint of each segment.
 
     `motion.segment` is the segment of each row, counted from 0: a segment ends in the middle of its blend, or, if the
     tool stops, with its dwell. A blend takes at most half of a neighbouring segment; a longer radius is shortened and
@@ -73,6 +84,7 @@ def plan_program(
             are not possible.
         progress: Called with the progress, 0 to 1; an exception raised by it cancels planning.
         max_rows: Largest number of 1 ms cycles: 17 minutes by default, as a check takes 1.1 KB per cycle.
+        free: Plans waypoints of the type free: `functools.partial(rcilab.plan_free, cell=cell)`.
 
     Raises:
         PlanningError: A target is out of reach, or a joint limit or a singularity is in the way; the message names the
@@ -80,7 +92,10 @@ def plan_program(
         InvalidValueError: The program is for another arm, or has waypoints in frames, or an argument is out of range.
     """
     speed = _require_valid(model, program, speed, rounds, law, max_rows)
-    count = len(program.waypoints)
+    expansion = expand(program.waypoints)
+    moves = expansion.moves
+    count = len(moves)
+    _require_rounds(rounds, count)
     model = program.applied_to(model)
     done = 0.0
 
@@ -93,16 +108,20 @@ def plan_program(
     approach = None if start is None else as_vector(start, model.n, "start", "rad")
     if approach is not None and np.abs(approach - program.start).max() <= STANDSTILL_DISTANCE:
         program, approach = replace(program, start=tuple(approach.tolist())), None
-    segments = build_segments(model, program, lambda part: report(_GEOMETRY_SHARE * part))
-    first_q, first_speed = np.array(program.start), speed * program.waypoints[0].speed
+    segments = build_segments(model, program.start, moves, lambda part: report(_GEOMETRY_SHARE * part))
+    _require_alike(segments, expansion)
+    moving = [move.waypoint.speed for move in moves if not move.waypoint.is_instruction]
+    first_q, first_speed = np.array(program.start), speed * (moving or [DEFAULT_SPEED])[0]
     builder = _MotionBuilder()
     if approach is not None:
         builder.add(_plan_move(model, approach, first_q, first_speed, "the move to the start", law))
     curves: list[_Curve] = []
+    done_moves = 0
     for run in _runs(segments):
-        overall = partial(_overall_progress, run[0].number, run[-1].number, count)
+        overall = partial(_overall_progress, done_moves + 1, done_moves + len(run), count)
+        done_moves += len(run)
         curves.append(
-            _plan_run(model, run, speed, builder.notes, law, lambda part, overall=overall: report(overall(part)))
+            _plan_run(model, run, speed, builder.notes, law, lambda part, overall=overall: report(overall(part)), free)
         )
         report(overall(1.0))
     return_move = (
@@ -113,7 +132,8 @@ def plan_program(
     for number in range(int(rounds)):
         for curve in (return_move, *curves) if return_move is not None and number else curves:
             builder.add(curve)
-    motion = builder.motion(speed * max(waypoint.speed for waypoint in program.waypoints), law)
+    motion = builder.motion(speed * max(moving or [1.0]), law)
+    motion = replace(motion, events=_events(expansion, motion, int(rounds), approach is not None))
     if len(motion) > max_rows:
         raise PlanningError(
             f"the program takes {motion.duration:.0f} s, {len(motion)} rows of 1 ms, more than {max_rows}: use "
@@ -135,7 +155,7 @@ def _require_valid(
         ).coded("program_model", theirs=program.model, ours=model.name)
     for number, waypoint in enumerate(program.waypoints, 1):
         if waypoint.frame is not None:
-            problem = "is not base: plan program.resolved(cell.frame_poses), with the cell that has this frame"
+            problem = "is not base: plan cell.resolve(program), with the cell that has this frame"
             error = InvalidValueError("frame", waypoint.frame, problem).coded("unresolved", frame=waypoint.frame)
             raise named_value(number, waypoint.type, error)
     speed = as_number(speed, "speed")
@@ -144,22 +164,56 @@ def _require_valid(
             "span", low="0", high="1"
         )
     for number, waypoint in enumerate(program.waypoints, 1):
-        if speed * waypoint.speed < MIN_SPEED:
+        if speed * waypoint.speed < MIN_SPEED and not waypoint.is_instruction:
             what = f"{label(number, waypoint)}, speed times {speed:g}"
             raise InvalidValueError(what, speed * waypoint.speed, f"must be at least {MIN_SPEED:g}").coded(
                 "least", least=f"{MIN_SPEED:g}"
             )
-    count = len(program.waypoints)
-    if not 1 <= as_number(rounds, "rounds") <= MOST_WAYPOINTS / count or int(rounds) != rounds:
-        raise InvalidValueError(
-            "rounds", rounds, f"must be whole, 1 to {MOST_WAYPOINTS // count} for {count} waypoints"
-        ).coded("rounds", most=MOST_WAYPOINTS // count)
     require_max_rows(max_rows)
     if law not in JOINT_LAWS:
         raise InvalidValueError("law", described(law), f"is unknown; known: {', '.join(JOINT_LAWS)}")
     if law == "s_profile":
         _require_stops(program)
     return speed
+
+
+def _require_rounds(rounds: int, count: int) -> None:
+    if not 1 <= as_number(rounds, "rounds") <= MOST_WAYPOINTS / count or int(rounds) != rounds:
+        raise InvalidValueError(
+            "rounds", rounds, f"must be whole, 1 to {MOST_WAYPOINTS // count} for {count} waypoints"
+        ).coded("rounds", most=MOST_WAYPOINTS // count)
+
+
+def _require_alike(segments: list[Segment], expansion: Expansion) -> None:
+    """Requires that a repetition that may be the last one ends where the others end."""
+    for event in expansion.events:
+        if event.kind != "leave":
+            continue
+        travel = np.abs(segments[event.until].start - segments[event.move].start)
+        if float(travel.max()) > STANDSTILL_DISTANCE:
+            raise PlanningError(
+                f"waypoint {event.row} (repeat): its repetitions end at different positions, joint "
+                f"{int(travel.argmax()) + 1} {math.degrees(float(travel.max())):.3g} deg apart: end the block with a "
+                "waypoint that has a target",
+                waypoint=event.row,
+            ).coded("repeat_apart", number=event.row, joint=int(travel.argmax()) + 1, angle=float(travel.max()))
+
+
+def _events(expansion: Expansion, motion: Motion, rounds: int, is_led_in: bool) -> tuple[MotionEvent, ...]:
+    """Returns the events of all rounds at their times."""
+    starts, count = motion.segment_starts, len(expansion.moves)
+    found: list[MotionEvent] = []
+    for number in range(rounds):
+        first = is_led_in + number * (count + 1)
+        for event in expansion.events:
+            time, until = (float(starts[first + move]) + event.delay for move in (event.move, event.until))
+            found.append(
+                MotionEvent(
+                    event.kind, time, event.signal, event.level, event.timeout,
+                    until if event.kind == "leave" else 0.0, event.row,
+                )
+            )  # fmt: skip
+    return tuple(found)
 
 
 def _overall_progress(first: int, last: int, count: int, part: float) -> float:
@@ -197,12 +251,13 @@ def _runs(segments: list[Segment]) -> list[list[Segment]]:
     runs: list[list[Segment]] = []
     continues = False
     for segment in segments:
-        if continues and not segment.is_stationary:
+        is_free = segment.waypoint.type == "free"
+        if continues and not segment.is_stationary and not is_free:
             runs[-1].append(segment)
         else:
             runs.append([segment])
         waypoint = segment.waypoint
-        continues = waypoint.blend > 0.0 and waypoint.dwell == 0.0 and not segment.is_stationary
+        continues = waypoint.blend > 0.0 and waypoint.dwell == 0.0 and not segment.is_stationary and not is_free
     return runs
 
 
@@ -228,6 +283,7 @@ def _plan_run(
     notes: list[str],
     law: JointLaw,
     report: Callable[[float], None],
+    free: FreePlanner | None,
 ) -> _Curve:
     segment = run[0]
     speed = scale * segment.waypoint.speed
@@ -261,7 +317,13 @@ def _plan_run(
     if segment.is_stationary:
         return _dwell_at(segment.goal, segment.waypoint.dwell)
     with naming(segment.label, segment.number, segment.waypoint.type):
-        if segment.path is None:
+        if segment.waypoint.type == "free":
+            if free is None:
+                raise InvalidValueError(
+                    "type", "free", "needs the cell: plan_program(..., free=partial(rcilab.plan_free, cell=cell))"
+                ).coded("free_cell")
+            motion = free(model, segment.start, segment.goal, speed=speed, law=law)
+        elif segment.path is None:
             motion = plan_joint(model, segment.start, segment.goal, speed=speed, law=law)
         else:
             motion = plan_path(model, segment.start, segment.path, speed, law)

@@ -41,7 +41,7 @@ program = Program(
 
 _TAIL = """
 model = program.applied_to(rcilab.load_model(program.model))
-{resolve}motion = rcilab.plan_program(model, program, law="torque_rate_limited")
+{resolve}motion = rcilab.plan_program(model, program, law="torque_rate_limited"{free})
 
 if __name__ == "__main__":
     report = rcilab.check(motion, model, box=program.safety_box{cell})
@@ -51,8 +51,8 @@ if __name__ == "__main__":
     sys.exit(0 if report.ok else 1)
 """
 
-_RESOLVE = """cell = rcilab.Cell.load("cell.json")  # The cell that has the frames of the waypoints.
-program = program.resolved(cell.frame_poses)
+_RESOLVE = """cell = rcilab.Cell.load("cell.json")  # The cell that has the frames and signals of the waypoints.
+program = cell.resolve(program)
 """
 
 
@@ -138,8 +138,19 @@ class Program:
         """Names of the frames that waypoints are given in; empty if all are in base."""
         return tuple(dict.fromkeys(waypoint.frame for waypoint in self.waypoints if waypoint.frame is not None))
 
+    @property
+    def needs_cell(self) -> bool:
+        """Whether only a cell can resolve it: frames, names of signals, jaws, or motions around obstacles."""
+        return any(
+            waypoint.frame is not None
+            or waypoint.type == "free"
+            or (waypoint.type == "tool" and waypoint.signal is None)
+            or isinstance(waypoint.signal, str)
+            for waypoint in self.waypoints
+        )
+
     def resolved(self, frames: Mapping[str, Pose]) -> Program:
-        """Returns the program with all waypoints in base, as `plan_program` requires it.
+        """Returns the program with all waypoints in base; `cell.resolve(program)` also resolves names of signals.
 
         Args:
             frames: Pose of each frame in base by its name, such as `cell.frame_poses`.
@@ -276,8 +287,12 @@ def program_script(program: Program) -> str:
     head += [("payload", program.payload), ("box", program.box), ("start", program.start)]
     lines = [f"    {key}={value!a},\n" for key, value in head if value not in (None, "")]
     waypoints = "".join(f"        {_call(waypoint)},\n" for waypoint in program.waypoints)
-    tail = _TAIL.format(resolve=_RESOLVE, cell=", cell=cell") if program.frames else _TAIL.format(resolve="", cell="")
-    return _HEAD + "".join(lines) + f"    waypoints=(\n{waypoints}    ),\n)\n" + tail
+    is_free = any(waypoint.type == "free" for waypoint in program.waypoints)
+    free = ", free=partial(rcilab.plan_free, cell=cell)" if is_free else ""
+    resolve, cell = (_RESOLVE, ", cell=cell") if program.needs_cell else ("", "")
+    tail = _TAIL.format(resolve=resolve, cell=cell, free=free)
+    head_text = _HEAD.replace("import sys\n", "import sys\nfrom functools import partial\n") if free else _HEAD
+    return head_text + "".join(lines) + f"    waypoints=(\n{waypoints}    ),\n)\n" + tail
 
 
 def _find(frames: Mapping[str, Pose], name: str) -> Pose:

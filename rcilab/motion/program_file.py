@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from rcilab.core.arrays import described
 from rcilab.core.atomic_file import read_limited, replacing
 from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchError
-from rcilab.motion.json_fields import excerpt, located, location, read_number, read_object, read_text, read_vector
+from rcilab.motion.json_fields import (
+    excerpt,
+    located,
+    location,
+    read_flag,
+    read_number,
+    read_object,
+    read_text,
+    read_vector,
+)
 from rcilab.motion.located_json import LongListError, Node, read_json, require_length
 from rcilab.motion.waypoint import ALLOWED, CHOICES, COMMON_FIELDS, MOST_WAYPOINTS, Waypoint, require_count, require_fit
 from rcilab.robots import RobotDescription, describe_robot
@@ -25,7 +34,8 @@ P = TypeVar("P")
 FORMAT = "rcilab program"
 VERSION = 1
 
-_SCALARS = ("angle", "psi", "speed", "blend", "dwell")
+_SCALARS = ("angle", "psi", "approach", "distance", "timeout", "count", *COMMON_FIELDS)
+_TEXTS = ("frame", "text", *CHOICES)
 _PROGRAM_KEYS = ("format", "version", "name", "model", "tool", "payload", "box", "start", "waypoints")
 
 
@@ -153,8 +163,7 @@ def _waypoint(node: Node, number: int, name: str, robot: RobotDescription) -> Wa
         if key == "type" or (value.value is None and key not in COMMON_FIELDS):
             continue
         what = f"{kind}, {key}"
-        read = read_number if key in _SCALARS else read_text if key in ("frame", *CHOICES) else read_vector
-        values[key] = read(name, value, what)
+        values[key] = _reader(key, value)(name, value, what)
     try:
         waypoint = Waypoint(**values)
         require_fit(waypoint, robot)
@@ -165,10 +174,19 @@ def _waypoint(node: Node, number: int, name: str, robot: RobotDescription) -> Wa
         ) from error
 
 
+def _reader(key: str, node: Node) -> Callable[[str, Node, str], object]:
+    if key in _SCALARS or (key == "signal" and not isinstance(node.value, str)):
+        return read_number
+    if key in _TEXTS or key == "signal":
+        return read_text
+    return read_flag if key == "level" else read_vector
+
+
 def _as_json_number(value: object) -> object:
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def _as_json_object(waypoint: Waypoint) -> dict[str, object]:
-    values = {field.name: getattr(waypoint, field.name) for field in fields(Waypoint)}
+    keys = ("type", *ALLOWED[waypoint.type])
+    values = {field.name: getattr(waypoint, field.name) for field in fields(Waypoint) if field.name in keys}
     return {key: value for key, value in values.items() if value is not None}

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.errors import InvalidValueError, KinematicsError, PlanningError, RcilabError
@@ -20,7 +21,7 @@ from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.path import Path, build_arc, build_circle, build_line
 from rcilab.motion.path_infeasibility import solve_path
 from rcilab.motion.path_timing import require_path
-from rcilab.motion.program import Program
+from rcilab.motion.program_expansion import Move
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 from rcilab.motion.waypoint import Waypoint, label, named_value
 
@@ -80,27 +81,49 @@ class Segment:
 
 
 def build_segments(
-    model: RobotModel, program: Program, progress: Callable[[float], None] = lambda part: None
+    model: RobotModel, start: ArrayLike, moves: Sequence[Move], progress: Callable[[float], None] = lambda part: None
 ) -> list[Segment]:
     """Returns the segments of a program; each starts at the end of the previous one.
+
+    Args:
+        model: The arm, with the tool of the program.
+        start: Joint angles at the start, shape (n,), [rad].
+        moves: The moves of the program.
+        progress: Called with the progress, 0 to 1.
 
     Raises:
         PlanningError: A target is out of reach, or a joint limit or a singularity is in the way; the message names the
             waypoint, the position and the reason.
         InvalidValueError: A waypoint does not fit this arm.
     """
-    q = np.array(program.start)
+    q = np.array(start)
     try:
         require_inside("start", q, model.limits.joint)
     except PlanningError as error:
         raise PlanningError(f"the start: {error}").coded("program_start", reason=error) from error
     segments: list[Segment] = []
-    for number, waypoint in enumerate(program.waypoints, 1):
+    for done, move in enumerate(moves, 1):
+        number, waypoint = move.row, move.waypoint
         with naming(label(number, waypoint), number, waypoint.type):
+            if move.offset:
+                waypoint = _shifted(model, waypoint, move.offset)
             segments.append(_segment(model, q, number, waypoint))
         q = segments[-1].goal
-        progress(number / len(program.waypoints))
+        progress(done / len(moves))
     return segments
+
+
+def _shifted(model: RobotModel, waypoint: Waypoint, offset: float) -> Waypoint:
+    """Returns a waypoint whose target is `offset`, [m], in front of its own, against the tool's z axis."""
+    target, psi, q = waypoint.pose, waypoint.psi, waypoint.q
+    if q is not None:
+        target, psi = model.forward(q), model.arm_angle(q) if model.redundancy else None
+    assert target is not None
+    T = target @ Pose((0.0, 0.0, -offset))
+    if q is not None and waypoint.type != "line":
+        angles = tuple(np.array(model.inverse(T, psi, q).nearest(q)).tolist())
+        return replace(waypoint, q=angles)
+    return replace(waypoint, q=None, position=tuple(T.position.tolist()), wxyz=tuple(T.wxyz.tolist()), psi=psi)
 
 
 @contextmanager
@@ -137,7 +160,9 @@ def _positions(path: Path, shares: Array) -> Array:
 
 
 def _segment(model: RobotModel, q: JointVector, number: int, waypoint: Waypoint) -> Segment:
-    if waypoint.type == "joint":
+    if waypoint.is_instruction:
+        return Segment(number=number, waypoint=waypoint, start=q, goal=q, path=None, knots=np.stack((q, q)))
+    if waypoint.type in ("joint", "free"):
         goal = _joint_goal(model, q, waypoint)
         require_inside("goal", goal, model.limits.joint)
         return Segment(
@@ -185,6 +210,9 @@ def _path(model: RobotModel, q: JointVector, waypoint: Waypoint) -> Path:
         return build_circle(T, waypoint.center, waypoint.axis, angle, *psi_range, orientation=orientation)
     if waypoint.type == "nullspace":
         return build_line(T, T, *psi_range)
+    if waypoint.type == "retreat":
+        assert waypoint.distance is not None
+        goal = T @ Pose((0.0, 0.0, -waypoint.distance))
     assert goal is not None
     if waypoint.via is not None:
         if waypoint.via_wxyz is None:

@@ -12,8 +12,8 @@ may be delayed while the plan uses a limit in full. The path does not change, no
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,18 @@ PREVIOUS_ROWS = 3
 _RAMPS = (0.08, 0.12, 0.18, 0.26, 0.38, 0.55, 0.8, 1.2, 1.8, 2.7, 4.0)  # [s]
 _DELAYS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, 2.5, 4.0)  # [s]
 _ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """From a controller cycle on, a motion waits, or continues from another cycle."""
+
+    now: int
+    """Cycle of the controller since the first command."""
+    cycle: int
+    """Cycle of the motion."""
+    is_waiting: bool
+    """Whether the arm stands there until the next shift."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -73,6 +85,32 @@ class SpeedScaledMotion:
     def time_at(self, plan_time: float) -> float:
         """Returns the time at which a time in the plan is first reached, [s]; that of the last row if it never is."""
         return min(int(np.searchsorted(self.plan_time, plan_time - _ROUNDING)), len(self.plan_time) - 1) * CYCLE_TIME
+
+    def shifted(self, shifts: Sequence[Shift]) -> SpeedScaledMotion:
+        """Returns the motion as it was commanded, with its waits for inputs, and without what was left out.
+
+        Args:
+            shifts: In the order of their cycles.
+        """
+        if not shifts:
+            return self
+        taken = [np.arange(shifts[0].now)]
+        for shift, following in zip(shifts, (*shifts[1:], None), strict=True):
+            count = len(self.q) - shift.cycle if following is None else following.now - shift.now
+            steps = np.zeros(count, dtype=np.intp) if shift.is_waiting and following is not None else np.arange(count)
+            taken.append(shift.cycle + steps)
+        rows = np.minimum(np.concatenate(taken), len(self.q) - 1)
+        is_still = np.diff(rows, append=rows[-1]) == 0
+        moving = np.where(is_still, 0.0, 1.0)
+        return replace(
+            self,
+            q=make_readonly(self.q[rows]),
+            plan_time=make_readonly(self.plan_time[rows]),
+            rate=make_readonly(self.rate[rows] * moving),
+            drate=make_readonly(self.drate[rows] * moving),
+            ddrate=make_readonly(self.ddrate[rows] * moving),
+            changed=max(self.changed, 1),
+        )
 
     def as_motion(self) -> Motion:
         """Returns the commanded rows as a motion; the planned motion if nothing has changed.

@@ -16,6 +16,7 @@ from rcilab.core.atomic_file import read_limited, replacing
 from rcilab.core.cycle_log import Column, write_csv
 from rcilab.core.errors import InvalidValueError, VersionMismatchError
 from rcilab.core.file_bounds import ROW_BYTES, require_bytes, require_max_rows, require_rows
+from rcilab.motion.motion_event import events_in
 from rcilab.motion.npy_reader import Shapes, contains_numbers, read_arrays
 from rcilab.motion.piecewise import PiecewisePolynomial, require_piece_shapes
 
@@ -120,6 +121,7 @@ def read_content(file: str | PathLike[str] | BinaryIO, max_rows: int, build: Cal
             # Files of older versions have neither.
             segment_starts=content.get("segment_starts", np.zeros(1)).astype(np.float64, casting="safe"),
             notes=tuple(content["notes"].tolist()) if "notes" in content else (),
+            events=events_in(content["events"]) if "events" in content else (),
         )
     except KeyError as error:
         raise InvalidValueError("motion file", name, f"is incomplete: {error} is missing") from error

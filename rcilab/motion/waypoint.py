@@ -17,37 +17,78 @@ from rcilab.motion.joint import DEFAULT_SPEED, MIN_SPEED
 from rcilab.motion.path import CircleOrientation, ElbowDirection
 from rcilab.robots.description import RobotDescription
 
-WaypointType: TypeAlias = Literal["joint", "line", "arc", "circle", "nullspace"]
+WaypointType: TypeAlias = Literal[
+    "joint", "line", "arc", "circle", "nullspace", "free", "retreat",
+    "wait", "input", "output", "tool", "repeat", "group", "end", "comment",
+]  # fmt: skip
 
 MAX_COORDINATE = 10.0
 """Largest coordinate, [m]: far beyond the reach of an arm; a larger one is probably in millimetres."""
 LARGEST_BLEND = 1.0
 """Largest blend radius, [m]: about the reach of an arm."""
+LARGEST_OFFSET = 1.0
+"""Largest distance of an approach or a retreat, [m]."""
 LONGEST_DWELL = 3600.0
 """Longest dwell at a waypoint, [s]."""
 _UNIT_TOLERANCE = 1e-3
 """Largest difference of a quaternion's length from 1; it is normalised."""
 
+LONGEST_TEXT = 200
+"""Longest comment or name of a group, [characters]."""
+MOST_REPEATS = 1000
+"""Largest number of repetitions."""
+DEFAULT_TIMEOUT = 10.0
+"""Default time to wait for an input, [s]."""
+
 COMMON_FIELDS = ("speed", "blend", "dwell")
-"""Fields of every waypoint."""
+"""Fields with a default; those of every motion."""
+_TARGET = ("q", "position", "wxyz", "frame", "psi")
 ALLOWED: dict[WaypointType, tuple[str, ...]] = {
-    "joint": ("q", "position", "wxyz", "frame", "psi"),
-    "line": ("q", "position", "wxyz", "frame", "psi"),
-    "arc": ("via", "via_wxyz", "q", "position", "wxyz", "frame", "psi"),
-    "circle": ("center", "axis", "frame", "angle", "orientation", "psi"),
-    "nullspace": ("psi", "way"),
+    "joint": (*_TARGET, "approach", *COMMON_FIELDS),
+    "line": (*_TARGET, "approach", *COMMON_FIELDS),
+    "arc": ("via", "via_wxyz", *_TARGET, *COMMON_FIELDS),
+    "circle": ("center", "axis", "frame", "angle", "orientation", "psi", *COMMON_FIELDS),
+    "nullspace": ("psi", "way", *COMMON_FIELDS),
+    "free": (*_TARGET, "approach", *COMMON_FIELDS),
+    "retreat": ("distance", *COMMON_FIELDS),
+    "wait": ("dwell",),
+    "input": ("signal", "level", "timeout"),
+    "output": ("signal", "level"),
+    "tool": ("jaws", "signal", "dwell"),
+    "repeat": ("count", "signal", "level", "text"),
+    "group": ("text",),
+    "end": (),
+    "comment": ("text",),
 }
-"""Further fields of a waypoint by type."""
+"""Fields of a waypoint by type."""
+INSTRUCTIONS: tuple[WaypointType, ...] = ("wait", "input", "output", "tool", "repeat", "group", "end", "comment")
+"""Types of steps at which nothing moves."""
+BLOCKS: tuple[WaypointType, ...] = ("repeat", "group")
+"""Types that begin a block, which "end" ends."""
 REQUIRED: dict[WaypointType, tuple[str, ...]] = {
     "joint": (),
     "line": (),
     "arc": ("via",),
     "circle": ("center", "axis"),
     "nullspace": ("psi",),
+    "free": (),
+    "retreat": ("distance",),
+    "wait": (),
+    "input": ("signal",),
+    "output": ("signal",),
+    "tool": (),
+    "repeat": ("count",),
+    "group": (),
+    "end": (),
+    "comment": ("text",),
 }
-"""Required fields in addition to a target; the target of a joint move, a line and an arc is q, or position and wxyz."""
+"""Required fields in addition to a target; the target of joint, line, arc and free is q, or position and wxyz."""
 
-CHOICES: dict[str, tuple[str, ...]] = {"orientation": get_args(CircleOrientation), "way": get_args(ElbowDirection)}
+CHOICES: dict[str, tuple[str, ...]] = {
+    "orientation": get_args(CircleOrientation),
+    "way": get_args(ElbowDirection),
+    "jaws": ("close", "open"),
+}
 """Values of the fields that have a fixed set of them; the first is the default."""
 
 Floats: TypeAlias = tuple[float, ...]
@@ -60,7 +101,8 @@ MOST_WAYPOINTS = 10_000
 class Waypoint:
     """One step of a program, as plain numbers, so that waypoints can be compared and files are exact.
 
-    `Waypoint.joint`, `.line`, `.arc`, `.circle` and `.nullspace` build one from poses and arrays.
+    `Waypoint.joint`, `.line`, `.arc`, `.circle`, `.nullspace` and `.free` build one from poses and arrays. Instructions
+    move nothing: they wait, set and await signals, and repeat other steps. `expand` makes plain moves of them.
 
     Raises:
         InvalidValueError: A number is missing, out of range or not used by this type.
@@ -68,7 +110,9 @@ class Waypoint:
 
     type: WaypointType
     """joint: straight in joint space. line, arc: the tool on a straight line, or through `via`. circle: around
-    `center`. nullspace: only the elbow moves."""
+    `center`. nullspace: only the elbow moves. free: around obstacles. retreat: the tool straight back along its z axis.
+    wait: for `dwell`. input: until a digital input has `level`. output: sets one. tool: opens or closes the jaws.
+    repeat, group ... end: a block of steps. comment: `text`, which nothing reads."""
     q: Floats | None = None
     """Target as joint angles, n of them, [rad]; for a line or an arc the pose and the arm angle at them."""
     position: Floats | None = None
@@ -95,6 +139,24 @@ class Waypoint:
     way: ElbowDirection | None = None
     """Direction of a nullspace move, "shorter" (default) or "longer"; the longer one to the arm angle of the start is a
     full turn."""
+    approach: float | None = None
+    """Distance from the target, against the tool's z axis, at which the tool arrives first, up to 1, [m]; from there it
+    moves on a straight line. `blend` then rounds this corner, and the tool stops at the target."""
+    distance: float | None = None
+    """Length of a retreat, more than 0 up to 1, [m]."""
+    signal: int | str | None = None
+    """Number of a digital signal of the controller, from 0, or its name in the cell. Of a tool: the output that closes
+    its jaws; None is that of the cell's jaws."""
+    level: bool | None = None
+    """Level of the signal; True by default. A repeat with a signal ends as soon as the input has it."""
+    timeout: float | None = None
+    """Longest time to wait for an input, up to 3600, [s]; then the program ends with an error."""
+    jaws: Literal["close", "open"] | None = None
+    """What the tool does."""
+    count: int | None = None
+    """Number of repetitions, 1 to 1000; with a signal the largest one, after which the program ends with an error."""
+    text: str | None = None
+    """A comment, or the name of a block, in one line."""
     speed: float = DEFAULT_SPEED
     """Part of the velocity and acceleration limits to use on the segment to this waypoint, 0.001 to 1; jerk limits
     are used in full."""
@@ -109,16 +171,18 @@ class Waypoint:
             known = ", ".join(get_args(WaypointType))
             error = InvalidValueError("type", described(self.type), f"is unknown; known: {known}")
             raise error.coded("unknown", known=known)
-        allowed = (*ALLOWED[self.type], *COMMON_FIELDS)
-        for name, known in CHOICES.items():
+        allowed = ALLOWED[self.type]
+        for name, default in _DEFAULTS.items():
             if getattr(self, name) is None and name in allowed:
-                object.__setattr__(self, name, known[0])
+                object.__setattr__(self, name, default)
+        if self.signal is None and self.type == "repeat":
+            object.__setattr__(self, "level", None)
         for name in _OPTIONAL:
             value = getattr(self, name)
             if value is not None and name not in allowed:
                 problem = f"has no meaning here; {self.type} takes: {', '.join(allowed)}"
                 raise InvalidValueError(name, described(value), problem).coded(
-                    "no_meaning", type=self.type, known=", ".join(allowed)
+                    "no_meaning", type=self.type, known=", ".join(allowed) or "–"
                 )
             if value is None and name in REQUIRED[self.type]:
                 missing = InvalidValueError(
@@ -127,42 +191,69 @@ class Waypoint:
                 raise missing.coded("missing", type=self.type, names=", ".join(REQUIRED[self.type]))
             if name in CHOICES:
                 _require_choice(name, value)
-            elif value is not None and name not in ("q", "frame", "angle", "psi"):
+            elif value is not None and name in _VECTORS:
                 object.__setattr__(self, name, vector_of(name, value))
         self._require_target()
         self._require_frame()
+        self._require_instruction()
         for name, lowest, highest, unit in _RANGES:
             value = getattr(self, name)
             if value is None:
                 continue
+            if name in COMMON_FIELDS and name not in allowed:
+                if value != _COMMON_DEFAULTS[name]:
+                    problem = f"has no meaning here; {self.type} takes: {', '.join(allowed) or 'nothing'}"
+                    raise InvalidValueError(name, described(value), problem).coded(
+                        "no_meaning", type=self.type, known=", ".join(allowed) or "–"
+                    )
+                continue
             number = as_number(value, name, unit)
-            if not lowest <= number <= highest or (name == "angle" and number == 0.0):
-                span = f"{'more than 0' if name == 'angle' else f'{lowest:.5g}'} to {highest:.5g} [{unit}]"
+            is_positive = name in ("angle", "distance")
+            if not lowest <= number <= highest or (is_positive and number == 0.0):
+                span = f"{'more than 0' if is_positive else f'{lowest:.5g}'} to {highest:.5g} [{unit}]"
                 error = InvalidValueError(name, number, f"must be from {span}")
                 raise error.coded("span", low=f"{lowest:.5g}", high=f"{highest:.5g}")
             object.__setattr__(self, name, number)
+        if self.type == "free" and self.blend and self.approach is None:
+            raise InvalidValueError("blend", self.blend, "must be 0: a motion around obstacles ends with a stop").coded(
+                "free_blend"
+            )
 
     @classmethod
     def joint(
         cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = DEFAULT_SPEED, blend: float = 0.0,
-        dwell: float = 0.0, frame: str | None = None,
+        dwell: float = 0.0, frame: str | None = None, approach: float | None = None,
     ) -> Waypoint:  # fmt: skip
         """Returns a straight move in joint space, to joint angles, shape (n,), [rad], or to a pose of the tool.
 
         A pose, in base or in a named frame, is reached on the branch closest to the previous joint angles.
         """
-        return cls(type="joint", **_target(target), frame=frame, psi=psi, speed=speed, blend=blend, dwell=dwell)
+        return cls(
+            type="joint", **_target(target), frame=frame, psi=psi, speed=speed, blend=blend, dwell=dwell,
+            approach=approach,
+        )  # fmt: skip
+
+    @classmethod
+    def free(
+        cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = DEFAULT_SPEED, dwell: float = 0.0,
+        frame: str | None = None, approach: float | None = None,
+    ) -> Waypoint:  # fmt: skip
+        """Returns a motion around the obstacles of the cell, to joint angles, shape (n,), [rad], or to a pose."""
+        return cls(type="free", **_target(target), frame=frame, psi=psi, speed=speed, dwell=dwell, approach=approach)
 
     @classmethod
     def line(
         cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = DEFAULT_SPEED, blend: float = 0.0,
-        dwell: float = 0.0, frame: str | None = None,
+        dwell: float = 0.0, frame: str | None = None, approach: float | None = None,
     ) -> Waypoint:  # fmt: skip
         """Returns a straight line of the tool to a pose, or to the pose at joint angles, shape (n,), [rad].
 
         The pose is in base, or in a named frame.
         """
-        return cls(type="line", **_target(target), frame=frame, psi=psi, speed=speed, blend=blend, dwell=dwell)
+        return cls(
+            type="line", **_target(target), frame=frame, psi=psi, speed=speed, blend=blend, dwell=dwell,
+            approach=approach,
+        )  # fmt: skip
 
     @classmethod
     def arc(
@@ -205,6 +296,67 @@ class Waypoint:
         """Returns a move of only the elbow to an arm angle, [rad], in the shorter or the longer direction."""
         return cls(type="nullspace", psi=psi, way=way, speed=speed, blend=blend, dwell=dwell)
 
+    @classmethod
+    def retreat(
+        cls, distance: float, *, speed: float = DEFAULT_SPEED, blend: float = 0.0, dwell: float = 0.0
+    ) -> Waypoint:  # fmt: skip
+        """Returns a straight line of the tool back along its z axis, [m]."""
+        return cls(type="retreat", distance=distance, speed=speed, blend=blend, dwell=dwell)
+
+    @classmethod
+    def wait(cls, dwell: float) -> Waypoint:
+        """Returns a time at standstill, [s]."""
+        return cls(type="wait", dwell=dwell)
+
+    @classmethod
+    def await_input(cls, signal: int | str, level: bool = True, timeout: float = DEFAULT_TIMEOUT) -> Waypoint:
+        """Returns a wait for an input, by number or name; after `timeout`, [s], the program ends with an error."""
+        return cls(type="input", signal=signal, level=level, timeout=timeout)
+
+    @classmethod
+    def set_output(cls, signal: int | str, level: bool = True) -> Waypoint:
+        """Returns the change of an output, by number or name; the tool does not stop for it."""
+        return cls(type="output", signal=signal, level=level)
+
+    @classmethod
+    def use_tool(cls, jaws: Literal["close", "open"], dwell: float = 0.5) -> Waypoint:
+        """Returns the closing or opening of the cell's jaws, and the time for it, [s]."""
+        return cls(type="tool", jaws=jaws, dwell=dwell)
+
+    @classmethod
+    def repeat(
+        cls, count: int, *, until: int | str | None = None, level: bool = True, text: str | None = None
+    ) -> Waypoint:  # fmt: skip
+        """Returns the begin of a block that runs `count` times, or until an input has a level; `Waypoint.end` ends it.
+
+        Args:
+            count: Number of repetitions; with `until` the largest one, after which the program ends with an error.
+            until: The input, by number or name, which is read after every repetition.
+            level: Its level.
+            text: Name for display.
+        """
+        return cls(type="repeat", count=count, signal=until, level=None if until is None else level, text=text)
+
+    @classmethod
+    def group(cls, text: str) -> Waypoint:
+        """Returns the begin of a named block, which runs once; `Waypoint.end` ends it."""
+        return cls(type="group", text=text)
+
+    @classmethod
+    def end(cls) -> Waypoint:
+        """Returns the end of a block."""
+        return cls(type="end")
+
+    @classmethod
+    def comment(cls, text: str) -> Waypoint:
+        """Returns a comment."""
+        return cls(type="comment", text=text)
+
+    @property
+    def is_instruction(self) -> bool:
+        """Whether nothing moves at this step."""
+        return self.type in INSTRUCTIONS
+
     @property
     def pose(self) -> Pose | None:
         """The target as a pose in `frame`, if it was given as one."""
@@ -225,7 +377,9 @@ class Waypoint:
                 error = InvalidValueError("type", described(kind), "has no target; joint, line and arc have one")
                 raise error.coded("no_target")
         point = None if via is None else vector_of("via", via)
-        return replace(self, type=type, via=point, via_wxyz=None)
+        approach = self.approach if "approach" in ALLOWED[type] else None
+        blend = 0.0 if type == "free" else self.blend
+        return replace(self, type=type, via=point, via_wxyz=None, approach=approach, blend=blend)
 
     def in_base(self, T_base_frame: Pose | ArrayLike) -> Waypoint:
         """Returns the waypoint with its numbers in base; one that has no frame stays as it is.
@@ -286,11 +440,55 @@ class Waypoint:
             raise InvalidValueError("frame", self.frame, problem).coded("frame_of_angles")
         object.__setattr__(self, "frame", self.frame.strip())
 
+    def _require_instruction(self) -> None:
+        if self.signal is not None:
+            object.__setattr__(self, "signal", _require_signal(self.signal))
+        if self.level is not None and not isinstance(self.level, bool | np.bool_):
+            raise InvalidValueError("level", described(self.level), "must be True or False").coded("no_level")
+        if self.type == "repeat" and self.signal is None and self.level is not None:
+            raise InvalidValueError("level", self.level, "has no meaning without a signal").coded("level_alone")
+        if self.count is not None:
+            count = as_number(self.count, "count")
+            if not (1 <= count <= MOST_REPEATS and count == int(count)):
+                raise InvalidValueError("count", self.count, f"must be whole, 1 to {MOST_REPEATS}").coded(
+                    "whole_span", low="1", high=str(MOST_REPEATS)
+                )
+            object.__setattr__(self, "count", int(count))
+        if self.text is not None:
+            if not (isinstance(self.text, str) and self.text.isprintable() and len(self.text) <= LONGEST_TEXT):
+                problem = f"must be text in one line, at most {LONGEST_TEXT} characters"
+                raise InvalidValueError("text", described(self.text), problem).coded("one_line")
+            object.__setattr__(self, "text", self.text.strip())
 
+
+def _require_signal(signal: object) -> int | str:
+    """Returns the number or the name of a signal."""
+    if isinstance(signal, str):
+        if signal.strip() and signal.isprintable():
+            return signal.strip()
+        raise InvalidValueError("signal", described(signal), "must be a name, text in one line").coded("one_line")
+    number = as_number(signal, "signal")
+    if not (0 <= number <= LAST_SIGNAL and number == int(number)):
+        raise InvalidValueError("signal", described(signal), f"must be whole, 0 to {LAST_SIGNAL}, or a name").coded(
+            "whole_span", low="0", high=str(LAST_SIGNAL)
+        )
+    return int(number)
+
+
+LAST_SIGNAL = 1023
+"""Largest number of a signal."""
+_DEFAULTS: dict[str, object] = {
+    **{name: known[0] for name, known in CHOICES.items()}, "level": True, "timeout": DEFAULT_TIMEOUT
+}  # fmt: skip
+_VECTORS = ("position", "wxyz", "via", "via_wxyz", "center", "axis")
+_COMMON_DEFAULTS = {field.name: field.default for field in fields(Waypoint) if field.name in COMMON_FIELDS}
 _OPTIONAL = tuple(field.name for field in fields(Waypoint) if field.default is None)
 _RANGES = (
     ("angle", 0.0, math.tau, "rad"),
     ("psi", -math.pi, math.pi, "rad"),
+    ("approach", 0.0, LARGEST_OFFSET, "m"),
+    ("distance", 0.0, LARGEST_OFFSET, "m"),
+    ("timeout", 0.0, LONGEST_DWELL, "s"),
     ("speed", MIN_SPEED, 1.0, "part of the limits"),
     ("blend", 0.0, LARGEST_BLEND, "m"),
     ("dwell", 0.0, LONGEST_DWELL, "s"),

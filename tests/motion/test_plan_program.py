@@ -18,7 +18,8 @@ from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint, plan_joint, plan_line, plan_program
 from rcilab.motion.blend import build_blend
-from rcilab.motion.segment import build_segments
+from rcilab.motion.program_expansion import expand
+from rcilab.motion.segment import Segment, build_segments
 from rcilab.motion.segment_spline import build_segment_spline
 
 TOOL = Pose((0.0, 0.02, 0.1))
@@ -36,6 +37,10 @@ def at(model, step, rpy=(0.0, 0.0, 0.0)) -> Pose:
 
 def program(model, *waypoints, start=None) -> Program:
     return Program(model=model.name, start=model.home if start is None else start, waypoints=waypoints)
+
+
+def segments_of(model, steps: Program) -> list[Segment]:
+    return build_segments(model, steps.start, expand(steps.waypoints).moves)
 
 
 def drawn(model, seed, count, types=TYPES) -> Program:
@@ -144,7 +149,7 @@ def test_a_random_program_keeps_every_joint_limit_is_smooth_and_arrives(name, se
     require_joint_limits(model, motion)
     require_smooth(motion)
     assert np.array_equal(motion.q[0], steps.start)
-    assert np.allclose(motion.q[-1], build_segments(model, steps)[-1].goal, atol=1e-9)
+    assert np.allclose(motion.q[-1], segments_of(model, steps)[-1].goal, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", sorted(MODELS))
@@ -167,7 +172,7 @@ def test_the_tool_leaves_its_way_only_inside_the_blend_radius(name, seed):
     motion = planned(model, steps)
     times = np.arange(0.0, motion.duration, 0.0193)
     points = model.position_path(motion.polynomial.sample(times))
-    segments = build_segments(model, steps)
+    segments = segments_of(model, steps)
     index = np.clip(np.searchsorted(motion.segment_starts, times, side="right") - 1, 0, len(segments) - 1)
     for i, segment in enumerate(segments):
         mine = points[index == i]
@@ -189,7 +194,7 @@ def test_every_pair_of_types_blends_inside_the_radius(name, seed, first, second,
     two = [drawn(model, int(rng.integers(2**32)), 1, (kind,)).waypoints[0] for kind in (first, second)]
     two = [replace(waypoint, blend=radius, dwell=0.0) for waypoint in two]
     try:
-        before, after = build_segments(model, program(model, *two))
+        before, after = segments_of(model, program(model, *two))
     except PlanningError:
         assume(False)
     assume(not before.is_stationary and not after.is_stationary)
@@ -223,7 +228,7 @@ def test_segments_are_told_in_order_and_reach_their_waypoints(name, seed):
     assert motion.segment[0] == 0
     assert motion.segment[-1] == len(steps.waypoints) - 1
     points = model.position_path(motion.q)
-    for i, segment in enumerate(build_segments(model, steps)[:-1]):
+    for i, segment in enumerate(segments_of(model, steps)[:-1]):
         last = points[np.flatnonzero(motion.segment <= i)[-1]]
         corner = segment.positions(model, np.ones(1))[0]
         waypoint = segment.waypoint

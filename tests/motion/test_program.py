@@ -22,7 +22,7 @@ from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchErr
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint, located_json, plan_program
-from rcilab.motion.waypoint import ALLOWED, CHOICES, COMMON_FIELDS
+from rcilab.motion.waypoint import ALLOWED, CHOICES
 
 MODEL = load_model("xMatePro7")
 HOME = MODEL.forward(MODEL.home)
@@ -135,7 +135,7 @@ def test_the_schema_knows_what_the_class_knows():
     schema = validator().schema
     validator().check_schema(schema)
     properties = schema["$defs"]["waypoint"]["properties"]
-    assert set(properties) == {"type", *COMMON_FIELDS, *(name for names in ALLOWED.values() for name in names)}
+    assert set(properties) == {"type", *(name for names in ALLOWED.values() for name in names)}
     assert properties["type"]["enum"] == list(ALLOWED)
     for key, default in (("speed", 0.2), ("blend", 0.0), ("dwell", 0.0)):
         assert properties[key]["default"] == default
@@ -146,8 +146,10 @@ def test_the_schema_knows_what_the_class_knows():
     waypoint_alone = validator().evolve(schema=alone)
     for kind, allowed in ALLOWED.items():
         assert waypoint_alone.is_valid({"type": kind, **_least(kind)})
-        for key in set(properties) - {"type", *COMMON_FIELDS, *allowed}:
+        for key in set(properties) - {"type", *allowed}:
             value = {"angle": 1.0, "psi": 1.0, "orientation": "held", "way": "longer", "frame": "tray"}
+            value |= {"approach": 0.1, "distance": 0.1, "signal": 1, "level": True, "timeout": 1.0, "jaws": "open"}
+            value |= {"count": 1, "text": "a", "speed": 0.5, "blend": 0.1, "dwell": 0.1}
             wrong = {"type": kind, **_least(kind), key: value.get(key, [1.0, 0.0, 0.0])}
             assert not waypoint_alone.is_valid(wrong), (kind, key)
         if "q" in _least(kind):
@@ -161,6 +163,16 @@ def _least(kind):
         "arc": {"q": [0.0] * 7, "via": [0.0] * 3},
         "circle": {"center": [0.0] * 3, "axis": [0.0, 0.0, 1.0]},
         "nullspace": {"psi": 0.0},
+        "free": {"q": [0.0] * 7},
+        "retreat": {"distance": 0.1},
+        "wait": {"dwell": 0.1},
+        "input": {"signal": 1},
+        "output": {"signal": "close gripper"},
+        "tool": {"jaws": "open"},
+        "repeat": {"count": 2},
+        "group": {"text": "pick"},
+        "end": {},
+        "comment": {"text": "none"},
     }[kind]
 
 

@@ -122,7 +122,7 @@ def test_the_motion_is_that_of_the_numbers_in_base_and_moves_with_the_frame():
 @pytest.mark.parametrize(
     ("act", "expected"),
     [
-        (lambda: plan_program(MODEL, program(*IN_TRAY)), r"waypoint 1 \(joint\), frame: 'tray' is not base: plan prog"),
+        (lambda: plan_program(MODEL, program(*IN_TRAY)), r"waypoint 1 \(joint\), frame: 'tray' is not base: plan cell"),
         (lambda: program(*IN_TRAY).resolved({"table": TRAY, "world": TRAY}),
          r"waypoint 1 \(joint\), frame: 'tray' does not exist; there are: table, world"),
         (lambda: program(*IN_TRAY).resolved({}), "there are: none"),

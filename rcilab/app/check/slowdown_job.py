@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 from rcilab.app.goal.goal_actions import SLOWEST
 from rcilab.app.planning import Plan, build_plan_view, make_plan
 from rcilab.app.program.program_draft import Draft
-from rcilab.app.program.program_planning import PROGRAM_LAW
+from rcilab.app.program.program_planning import PROGRAM_LAW, around, as_plan_of
 from rcilab.conformance.check import check
 from rcilab.core.background_job import ProgressCallback
 from rcilab.motion import plan_program
+from rcilab.motion.waypoint import Waypoint
 
 if TYPE_CHECKING:
     from rcilab.conformance.time_scaling import SlowDown
@@ -53,29 +54,35 @@ def slow_to_goal(plan: Plan, speed: float, law: JointLaw, via: Pose | None, prog
 
 def slow_program(plan: Plan, draft: Draft, rounds: int, progress: ProgressCallback) -> SlowdownJob:
     """Returns the plan of the same program with every speed scaled by the largest factor that conforms."""
+    planned = plan.program
+    assert planned is not None  # It is the plan of a program.
+    waypoints = planned.waypoints
     drafts: dict[float, Draft] = {}
 
     def make(scale: float) -> Plan | None:
-        drafts[scale] = slower = scaled(draft, scale)
-        made = slower.program(plan.model)
-        assert made is not None
-        program = made.resolved(plan.frames)
-        motion = plan_program(plan.model, program, start=plan.motion.start, rounds=rounds, law=PROGRAM_LAW)
+        drafts[scale] = scaled(draft, scale)
+        program = replace(planned, waypoints=tuple(slowed(waypoint, scale) for waypoint in waypoints))
+        motion = plan_program(
+            plan.model, program, start=plan.motion.start, rounds=rounds, law=PROGRAM_LAW, free=around(plan.cell)
+        )
         report = check(motion, plan.model, start=plan.motion.start, box=plan.box, distance=None)
         view = build_plan_view(plan.model, motion, report, plan.box)
-        return replace(view, program=program, frames=plan.frames).completed(cell=plan.cell)
+        return as_plan_of(view, program, plan.frames).completed(cell=plan.cell)
 
-    slowest = min((step.waypoint.speed for step in draft.steps), default=1.0)
+    slowest = min((step.waypoint.speed for step in draft.steps if not step.waypoint.is_instruction), default=1.0)
     result = _slower(plan, make, SLOWEST / slowest, progress)
     return result if result.is_stretched else replace(result, draft=drafts.get(result.scale))
 
 
 def scaled(draft: Draft, scale: float) -> Draft:
     """Returns a program with every speed scaled."""
-    steps = tuple(
-        replace(step, waypoint=replace(step.waypoint, speed=scale * step.waypoint.speed)) for step in draft.steps
-    )
+    steps = tuple(replace(step, waypoint=slowed(step.waypoint, scale)) for step in draft.steps)
     return replace(draft, steps=steps)
+
+
+def slowed(waypoint: Waypoint, scale: float) -> Waypoint:
+    """Returns a waypoint with its speed scaled; an instruction has none."""
+    return waypoint if waypoint.is_instruction else replace(waypoint, speed=scale * waypoint.speed)
 
 
 def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, progress: ProgressCallback) -> SlowdownJob:
@@ -97,6 +104,6 @@ def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, prog
     assert found.motion is not None
     assert found.report is not None
     whole = build_plan_view(plan.model, found.motion, found.report, plan.box)
-    whole = replace(whole, missed_by=plan.missed_by, program=plan.program, frames=plan.frames)
+    whole = replace(whole, missed_by=plan.missed_by, program=plan.program, steps=plan.steps, frames=plan.frames)
     whole = replace(whole, cell=plan.cell, complete=True)
     return SlowdownJob(found=found, plan=whole, scale=1.0 / found.factor, is_stretched=True)

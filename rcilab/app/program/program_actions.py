@@ -99,7 +99,7 @@ class ProgramActions:
         cell = state.cell.cell
         poses = {} if cell is None else cell.frame_poses
         try:
-            in_base = program.resolved(poses)
+            in_base = program.resolved({}) if cell is None else cell.resolve(program)
         except InvalidValueError as error:
             self._store.notify("warn", message("plan.failed", error=describe_error(error)))
             return

@@ -18,7 +18,7 @@ from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Message, Remark, message
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.program import Program, box_numbers, payload_numbers, payload_of, tool_numbers
-from rcilab.motion.waypoint import Floats, Waypoint, WaypointType
+from rcilab.motion.waypoint import BLOCKS, Floats, Waypoint, WaypointType
 
 TYPES: tuple[WaypointType, ...] = ("joint", "line", "arc")
 """The types that the page can create; circles and elbow moves come from files."""
@@ -103,6 +103,8 @@ class Draft:
         if not steps or self.start is None:
             return None
         waypoints = tuple(step.waypoint for step in steps)
+        if last is not None:
+            waypoints = _closed(waypoints)
         return Program(
             model=self.model,
             start=self.start,
@@ -131,6 +133,18 @@ class Draft:
         """Returns the arm with the tool and the load that this program is for."""
         changed = model if self.tool is None else model.with_tool(Pose(self.tool[:3], self.tool[3:]))
         return changed if self.payload is None else changed.with_load(payload_of(self.payload))
+
+
+def _closed(waypoints: tuple[Waypoint, ...]) -> tuple[Waypoint, ...]:
+    """Returns the first steps of a program with the blocks that have begun run once, up to there."""
+    opened: list[int] = []
+    for index, waypoint in enumerate(waypoints):
+        if waypoint.type in BLOCKS:
+            opened.append(index)
+        elif waypoint.type == "end" and opened:
+            opened.pop()
+    steps = [Waypoint.group("") if index in opened else waypoint for index, waypoint in enumerate(waypoints)]
+    return (*steps, *(Waypoint.end() for _ in opened))
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,8 +262,7 @@ def _in_base(waypoint: Waypoint, poses: dict[str, Pose]) -> Waypoint:
 
 def is_led_in(plan: Plan) -> bool:
     """Returns whether the plan of a program begins with the approach to its start."""
-    assert plan.program is not None
-    return (len(plan.motion.segment_starts) + 1) % (len(plan.program.waypoints) + 1) == 1
+    return (len(plan.motion.segment_starts) + 1) % (len(plan.steps) + 1) == 1
 
 
 def number_at(plan: Plan, time: float) -> int | None:
@@ -261,13 +274,16 @@ def number_at(plan: Plan, time: float) -> int | None:
         return None
     before = max(time - _SAME_TIME, 0.0)
     segment = int(np.searchsorted(plan.motion.segment_starts, before, side="right")) - 1 - is_led_in(plan)
-    number = segment % (len(plan.program.waypoints) + 1) + 1
-    return 0 if segment < 0 or number > len(plan.program.waypoints) else number
+    index = segment % (len(plan.steps) + 1)
+    return 0 if segment < 0 or index >= len(plan.steps) else plan.steps[index]
 
 
 def time_at(plan: Plan, number: int) -> float:
     """Returns the time at which the motion first reaches the end of a waypoint's segment, with its dwell, [s]."""
-    segment = number - 1 + is_led_in(plan)
+    index = next((index for index, step in enumerate(plan.steps) if step >= number), len(plan.steps) - 1)
+    while plan.steps[index + 1 : index + 2] == (number,):
+        index += 1
+    segment = index + is_led_in(plan)
     starts = plan.motion.segment_starts
     return float(starts[segment + 1]) if segment + 1 < len(starts) else plan.motion.duration
 

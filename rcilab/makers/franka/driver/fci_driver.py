@@ -25,6 +25,7 @@ from rcilab.makers.driver import (
     GuideSpace,
     RequestLock,
     SafetyStopReason,
+    SignalRequest,
 )
 from rcilab.makers.franka.collisions import describe_collisions
 from rcilab.makers.franka.driver.active_client import ActiveClient
@@ -204,6 +205,14 @@ class FciDriver:
         raise ModelError("Franka's interface has no digital signals")
 
     def read_input(self, signal: int) -> bool:
+        """Raises an error: there are no digital signals.
+
+        Raises:
+            ModelError: Always.
+        """
+        raise ModelError("Franka's interface has no digital signals")
+
+    def ask_signal(self, signal: int, level: bool | None = None) -> SignalRequest:
         """Raises an error: there are no digital signals.
 
         Raises:

@@ -13,7 +13,15 @@ from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, RobotMode, RobotState
 from rcilab.makers.address import ControllerAddress
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.makers.driver import ConfiguredArm, ExpectedArm, GuideKind, GuideSpace, RequestLock, SafetyStopReason
+from rcilab.makers.driver import (
+    ConfiguredArm,
+    ExpectedArm,
+    GuideKind,
+    GuideSpace,
+    RequestLock,
+    SafetyStopReason,
+    SignalRequest,
+)
 from rcilab.makers.fault_report import describe_faults
 from rcilab.makers.known_setup import with_reported_load, with_reported_tool
 from rcilab.makers.library_connection import LibraryDriver
@@ -172,6 +180,10 @@ class RealManDriver(LibraryDriver[NumberedPush]):
     def read_input(self, signal: int) -> bool:
         """Returns the level of a digital input of the controller."""
         return self._settings.read_input(signal)
+
+    def ask_signal(self, signal: int, level: bool | None = None) -> SignalRequest:
+        """Sends a request for a digital signal during a motion."""
+        return self._settings.ask_signal(signal, level)
 
     def reboot(self) -> None:
         """Raises an error: the interface has no restart.

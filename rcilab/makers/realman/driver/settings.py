@@ -20,7 +20,7 @@ from rcilab.core.errors import CommandRejectedError, ControlError, InvalidValueE
 from rcilab.core.fault import FaultCode
 from rcilab.core.spatial import IDENTITY, Pose, as_pose
 from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, SoftJointLimits, tool_limits_of
-from rcilab.makers.driver import require_signal
+from rcilab.makers.driver import SignalRequest, require_signal
 from rcilab.makers.realman.bounds import (
     ANGLE_STEP,
     FASTEST_TOOL,
@@ -274,6 +274,15 @@ class RealManSettings:
         number = require_signal(signal, INPUTS)
         with self._request("read_input"):
             return bool(self._call(self.api.rm_get_io_input)[number])
+
+    def ask_signal(self, signal: int, level: bool | None = None) -> SignalRequest:
+        """Sends a request for a digital signal during a motion; see `StreamingDriver`."""
+        request, api = self._client.request, self.api
+        if level is None:
+            number = require_signal(signal, INPUTS)
+            return self._link.post(request, api.rm_get_io_input).reading(lambda levels: bool(levels[number]))
+        number = require_signal(signal, OUTPUTS)
+        return self._link.post(request, api.rm_set_do_state, number + 1, int(level))
 
     def read_limits(self) -> RobotConfiguration:
         """Returns the limits in force in the controller: ranges, speeds and accelerations of joints and tool."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Callable
+from typing import Any, Literal
 
 from rcilab.core.errors import CommandRejectedError
 from rcilab.core.state import ControllerMode
-from rcilab.makers.driver import require_signal
+from rcilab.makers.driver import SignalRequest, require_signal
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.bounds import SIGNAL_NAMES
+from rcilab.makers.rokae.driver.connection import PostedRequest
 from rcilab.makers.rokae.driver.settings import RciSettings, flag, member
 
 
@@ -67,6 +69,12 @@ class RciCommands(RciSettings):
         """Returns the level of a digital input, 0 to 5."""
         return bool(self._request(rci.GetDIState(require_signal(signal, SIGNAL_NAMES))).level)
 
+    def ask_signal(self, signal: int, level: bool | None = None) -> SignalRequest:
+        """Sends a request for a digital signal during a motion; see `StreamingDriver`."""
+        number = require_signal(signal, SIGNAL_NAMES)
+        request = rci.GetDIState(number) if level is None else rci.SetDO(number, flag("level", level))
+        return _PostedSignal(self._link.post(request), self.require_done)
+
     def start_drag(
         self,
         space: rci.DragSpace | Literal["joint", "cartesian"] = rci.DragSpace.JOINT,
@@ -91,3 +99,25 @@ class RciCommands(RciSettings):
     def reboot(self) -> None:
         """Restarts the controller; the connection ends with it, `rcilab.connect` makes the next one."""
         self._ask(rci.RebootRobot())
+
+
+class _PostedSignal:
+    """A request for a digital signal, a `SignalRequest`.
+
+    Args:
+        posted: The request.
+        require_done: Raises the error of a refusal.
+    """
+
+    def __init__(self, posted: PostedRequest, require_done: Callable[[rci.Request, Any], None]) -> None:
+        self._posted, self._require_done = posted, require_done
+
+    def poll(self) -> bool | None:
+        """Returns the level, or None until the answer; never waits."""
+        answer = self._posted.poll()
+        if answer is None:
+            return None
+        if isinstance(self._posted.request, rci.GetDIState):
+            return bool(answer.level)
+        self._require_done(self._posted.request, answer.status)
+        return True

@@ -57,6 +57,7 @@ class RciConnection:
         self._transport = transport
         self._decoder = StateDecoder()
         self._command_id = 0
+        self._posted: dict[int, PostedRequest] = {}
         self._one_request = threading.Lock()  # Of the TCP connection: a motion's thread and others may send requests.
 
     @property
@@ -96,6 +97,40 @@ class RciConnection:
         """Sends a request while a motion's thread receives the states, from any thread; see `request`."""
         return self._request(request, timeout, self._transport.wait_for_frame)
 
+    def post(self, request: Request) -> PostedRequest:
+        """Sends a request, or later if another thread awaits an answer; never waits."""
+        posted = PostedRequest(self, request)
+        self.send_posted(posted)
+        return posted
+
+    def send_posted(self, posted: PostedRequest) -> None:
+        """Sends a posted request, unless another thread awaits an answer."""
+        if not self._one_request.acquire(blocking=False):
+            return
+        try:
+            self._command_id = self._command_id % 0xFFFFFFFF + 1
+            self._transport.send_request(encode_request(posted.request, self._command_id))
+            self._posted[self._command_id] = posted
+            posted.is_sent = True
+        finally:
+            self._one_request.release()
+
+    def receive_posted(self) -> None:
+        """Takes the answers to posted requests that have arrived, unless another thread receives answers."""
+        if not self._one_request.acquire(blocking=False):
+            return
+        try:
+            while (frame := self._transport.receive_frame()) is not None:
+                self._take_posted(frame)
+        finally:
+            self._one_request.release()
+
+    def _take_posted(self, frame: bytes) -> None:
+        """Keeps a frame that answers a posted request; drops any other one."""
+        posted = self._posted.pop(decode_header(frame).command_id, None)
+        if posted is not None:
+            posted.answer = decode_response(posted.request.code, frame)[1]
+
     def _request(self, request: Request, timeout: float | None, wait: Callable[[float], object]) -> Any:
         limit = self.timeout if timeout is None else timeout
         deadline = time.monotonic() + limit
@@ -107,6 +142,7 @@ class RciConnection:
                 if frame is not None:
                     if decode_header(frame).command_id == self._command_id:
                         return decode_response(request.code, frame)[1]
+                    self._take_posted(frame)
                     continue
                 remaining = deadline - time.monotonic()
                 if remaining <= 0.0:
@@ -136,6 +172,39 @@ class RciConnection:
             self.latest = states[-1]
             self._latest_since_ns = empty_ns
         return states
+
+
+class PostedRequest:
+    """A request that was sent without waiting for its answer.
+
+    Attributes:
+        request: The request.
+        is_sent: Whether it was sent.
+        answer: Its answer; None until then.
+
+    Args:
+        connection: The connection.
+        request: As the attribute.
+    """
+
+    def __init__(self, connection: RciConnection, request: Request) -> None:
+        self.request, self._connection = request, connection
+        self.is_sent = False
+        self.answer: Any = None
+
+    def poll(self) -> Any:
+        """Returns the answer, or None until it arrives; never waits.
+
+        Raises:
+            ConnectionLostError: The connection broke.
+            DecodeError: The answer is malformed.
+        """
+        if self.answer is None:
+            if self.is_sent:
+                self._connection.receive_posted()
+            else:
+                self._connection.send_posted(self)
+        return self.answer
 
 
 def _ignore(states: list[RobotState]) -> None:

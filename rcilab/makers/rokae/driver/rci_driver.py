@@ -19,6 +19,7 @@ from rcilab.makers.driver import (
     GuideSpace,
     RequestLock,
     SafetyStopReason,
+    SignalRequest,
 )
 from rcilab.makers.rokae.driver.address import RciAddress, parse_address
 from rcilab.makers.rokae.driver.commands import RciCommands
@@ -182,6 +183,10 @@ class RciDriver:
     def read_input(self, signal: int) -> bool:
         """Returns the level of a digital input."""
         return self._commands.get_di(signal)
+
+    def ask_signal(self, signal: int, level: bool | None = None) -> SignalRequest:
+        """Sends a request for a digital signal during a motion."""
+        return self._commands.ask_signal(signal, level)
 
     def reboot(self) -> None:
         """Restarts the controller."""

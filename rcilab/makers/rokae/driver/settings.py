@@ -196,7 +196,14 @@ class RciSettings:
         return [f"joint {i + 1}" for i in range(self.n)]
 
     def _ask(self, request: rci.Request, also_good: IntEnum | None = None, timeout: float | None = None) -> None:
-        status = self._request(request, timeout).status
+        self.require_done(request, self._request(request, timeout).status, also_good)
+
+    def require_done(self, request: rci.Request, status: Any, also_good: IntEnum | None = None) -> None:
+        """Requires a status of an answer that is no refusal.
+
+        Raises:
+            CommandRejectedError: The controller refuses the request.
+        """
         if status == 0 or status == also_good:
             return
         reason = None

@@ -18,7 +18,7 @@ from rcilab.core.arrays import JointVector, described
 from rcilab.core.errors import CommandRejectedError, ControlError, InvalidValueError, RcilabError, UsageError
 from rcilab.core.safety_box import SafetyBox, require_straight
 from rcilab.core.spatial import Pose, as_pose
-from rcilab.makers.driver import require_signal
+from rcilab.makers.driver import SignalRequest, require_signal
 from rcilab.makers.setting_values import bounded_vector
 from rcilab.makers.ufactory.bounds import (
     COLLISION_SENSITIVITIES,
@@ -192,6 +192,15 @@ class XArmSettings:
         number = require_signal(signal, INPUTS)
         with self._request("get_cgpio_digital"):
             return bool(self._call("get_cgpio_digital", number))
+
+    def ask_signal(self, signal: int, level: bool | None = None) -> SignalRequest:
+        """Sends a request for a digital signal of the control box during a motion; see `StreamingDriver`."""
+        request, api = self._client.request, self.api
+        if level is None:
+            name, number = "get_cgpio_digital", require_signal(signal, INPUTS)
+            return self._link.post(request, name, api.get_cgpio_digital, number).reading(bool)
+        name, number = "set_cgpio_digital", require_signal(signal, OUTPUTS)
+        return self._link.post(request, name, api.set_cgpio_digital, number, int(level), sync=False)
 
     def set_mode(self, mode: int) -> None:
         """Sets a mode (0, 1, 2, 4, 5, 6 or 7) and makes the arm ready for its commands, as those of `api`."""
