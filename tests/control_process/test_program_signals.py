@@ -62,7 +62,7 @@ def test_a_late_input_and_a_missing_signal_are_errors_of_the_request(shared):
     world.set_input(0, False)
     step = Waypoint.joint(supervisor.status().q_c + 0.02, speed=0.3)
     _, request = execute(supervisor, step, Waypoint.await_input(0, timeout=0.1))
-    with pytest.raises(DeadlineError, match="step 2: input DI0_0 was not on within 0.1 s"):
+    with pytest.raises(DeadlineError, match=r"step 2: input DI0_0 was not on within 0\.1 s"):
         request.wait(SOON)
     status = supervisor.status()
     assert (status.phase, status.awaited) == ("idle", None)

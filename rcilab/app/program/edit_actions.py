@@ -8,9 +8,10 @@ from typing import ClassVar, Literal
 
 from rcilab.app.connection import PageConnection
 from rcilab.app.goal.goal_actions import GoalActions
-from rcilab.app.program.program_draft import MOST_ROUNDS, TYPES, Draft, placed, target_of, time_at
+from rcilab.app.program.new_steps import new_steps
+from rcilab.app.program.program_draft import MOST_ROUNDS, TYPES, Draft, placed, target_in_base, target_of, time_at
 from rcilab.app.program.program_history import ProgramHistory
-from rcilab.app.program.waypoint_fields import as_pose, default_via, proposed
+from rcilab.app.program.waypoint_fields import arm_angle_of, as_pose, default_via, proposed
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store
@@ -19,7 +20,7 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.i18n.number_parsing import parse_number
 from rcilab.i18n.translator import Message, message
-from rcilab.motion.waypoint import Waypoint
+from rcilab.motion.waypoint import ALLOWED, CHOICES, Waypoint
 
 LONGEST_NAME = 80
 
@@ -30,7 +31,7 @@ class EditProgram(Request):
 
     what: Literal[
         "select", "add", "teach", "via", "type", "frame", "delete", "duplicate", "up", "down", "move", "start", "aim",
-        "undo", "redo", "clear", "script", "tool",
+        "undo", "redo", "clear", "script", "tool", "insert", "choose",
     ]  # fmt: skip
     key: int | None = None
     """Key of a step; None is the selected one."""
@@ -39,6 +40,10 @@ class EditProgram(Request):
     type: str = ""
     frame: str | None = None
     """Name of a frame of the cell; None is base."""
+    name: str = ""
+    """Name of a field of a step that has a fixed set of values."""
+    value: str = ""
+    """Its value; "on" or "off" for a level."""
     index: int = 0
     """New index of a step, from 0."""
 
@@ -73,7 +78,7 @@ class EditActions:
             "select": self._select, "teach": self._teach, "via": self._via, "type": self._retype,
             "frame": self._reframe, "delete": self._delete, "duplicate": self._duplicate, "aim": self._aim,
             "up": lambda request, key: self._move(key, -1), "down": lambda request, key: self._move(key, 1),
-            "move": self._move_to,
+            "move": self._move_to, "choose": self._choose,
         }  # fmt: skip
 
     @property
@@ -88,7 +93,7 @@ class EditActions:
         """Changes the program, or its selection; what is not possible now is reported."""
         self._history.open()
         whole = {
-            "add": lambda: self._add(request), "start": self._start_here,
+            "add": lambda: self._add(request), "start": self._start_here, "insert": lambda: self._insert(request),
             "undo": self._history.undo, "redo": self._history.redo,
             "clear": lambda: self._history.change(Draft(model=self._draft.model), None),
             "tool": self._take_setup,
@@ -205,10 +210,51 @@ class EditActions:
             here = self._connection.status().q_c
             draft = replace(draft, start=tuple((q if here is None else here).tolist()))
         waypoint = Waypoint(type="joint", q=tuple(q.tolist()))
-        if chosen is not None:
+        if chosen is not None and not chosen.is_instruction:
             waypoint = replace(waypoint, speed=chosen.speed, blend=chosen.blend)
-            waypoint = replace(waypoint, type="line" if chosen.type != "joint" else "joint")
+            waypoint = replace(waypoint, type="line" if chosen.type not in ("joint", "free") else "joint")
         self._history.change(*draft.inserted(waypoint, self._history.state.selected))
+
+    def _insert(self, request: EditProgram) -> None:
+        """Inserts a step after the selected one, or a block around it."""
+        draft, selected = self._draft, self._history.state.selected
+        if draft.start is None:
+            q = self._configuration("here")
+            if q is None:
+                return
+            draft = replace(draft, start=tuple(q.tolist()))
+        T, psi = self._place_before(draft, selected)
+        made = new_steps(request.type, T, psi, self._store.state.cell.cell)
+        if len(made) == 1:
+            self._history.change(*draft.inserted(made[0], selected))
+        elif made:
+            self._history.change(*draft.wrapped(*made, selected, selected))
+
+    def _place_before(self, draft: Draft, key: int | None) -> tuple[Pose, float | None]:
+        """Returns pose and arm angle at the last step with a target up to a step, or at the start."""
+        arm = draft.arm(self._store.state.model)
+        in_base = placed(draft, self._store.state.cell.cell)
+        index = in_base.index(key)
+        for step in reversed(in_base.steps[: len(in_base.steps) if index is None else index + 1]):
+            target = target_in_base(step.waypoint, arm)
+            if target is not None:
+                return target, arm_angle_of(step.waypoint, arm) or (0.0 if arm.redundancy else None)
+        start = Waypoint(type="joint", q=draft.start)
+        return arm.forward(draft.start), arm_angle_of(start, arm)
+
+    def _choose(self, request: EditProgram, key: int) -> None:
+        """Sets a field that has a fixed set of values."""
+        waypoint = self._draft.waypoint(key)
+        if waypoint is None or request.name not in ALLOWED[waypoint.type] or request.name not in ("level", *CHOICES):
+            return
+        value = request.value == "on" if request.name == "level" else request.value
+        try:
+            changed = replace(waypoint, **{request.name: value})
+        except InvalidValueError as error:
+            self._store.notify("warn", explain_error(error))
+            return
+        if changed != waypoint:
+            self._history.change(self._draft.changed(key, changed), key)
 
     def _start_here(self) -> None:
         q = self._configuration("here")
@@ -253,6 +299,9 @@ class EditActions:
         waypoint = self._draft.waypoint(key)
         if waypoint is None or request.type == waypoint.type or request.type not in TYPES:
             return
+        if request.type == "free" and not self._draft_has_cell():
+            self._store.notify("warn", message("program.free_cell"))
+            return
         if waypoint.type not in TYPES:
             self._store.notify("warn", message("program.no_target"))
             return
@@ -268,6 +317,9 @@ class EditActions:
             self._store.notify("good", message("program.via_made"))
         self._change_in_base(key, in_base.retyped(request.type, via), waypoint.frame)
 
+    def _draft_has_cell(self) -> bool:
+        return self._store.state.cell.cell is not None
+
     def _delete(self, request: EditProgram, key: int) -> None:
         index = self._draft.index(key) or 0
         draft = self._draft.without(key)
@@ -277,7 +329,10 @@ class EditActions:
     def _duplicate(self, request: EditProgram, key: int) -> None:
         waypoint = self._draft.waypoint(key)
         assert waypoint is not None
-        self._history.change(*self._draft.inserted(waypoint, key))
+        if self._draft.partner(key) is None:
+            self._history.change(*self._draft.inserted(waypoint, key))
+        else:
+            self._history.change(*self._draft.repeated(key))
 
     def _move(self, key: int, step: int) -> None:
         index = self._draft.index(key)

@@ -20,8 +20,8 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.motion.program import Program, box_numbers, payload_numbers, payload_of, tool_numbers
 from rcilab.motion.waypoint import BLOCKS, Floats, Waypoint, WaypointType
 
-TYPES: tuple[WaypointType, ...] = ("joint", "line", "arc")
-"""The types that the page can create; circles and elbow moves come from files."""
+TYPES: tuple[WaypointType, ...] = ("joint", "line", "arc", "free")
+"""The types with a target, which can be exchanged for each other."""
 FILE_FIELD = "program.0.file"
 """Name of a problem of a file in `UiState.problems`."""
 MOST_ROUNDS = 100
@@ -72,9 +72,48 @@ class Draft:
         at = len(self.steps) if index is None else index + 1
         return replace(self, steps=(*self.steps[:at], step, *self.steps[at:])), step.key
 
-    def without(self, key: int) -> Draft:
-        """Returns the draft without a step."""
-        return replace(self, steps=tuple(step for step in self.steps if step.key != key))
+    def wrapped(self, begin: Waypoint, end: Waypoint, first: int | None, last: int | None) -> tuple[Draft, int]:
+        """Returns the draft with a block around its steps from one to another, and the key of the block's begin."""
+        low, high = self.index(first), self.index(last)
+        if low is None or high is None:
+            low, high = len(self.steps), len(self.steps) - 1
+        opening, closing = Step(next(_KEYS), begin), Step(next(_KEYS), end)
+        inner = self.steps[low : high + 1]
+        return replace(self, steps=(*self.steps[:low], opening, *inner, closing, *self.steps[high + 1 :])), opening.key
+
+    def without(self, *keys: int) -> Draft:
+        """Returns the draft without some steps; with one end of a block, its other end is left out, too."""
+        gone = {*keys, *(self.partner(key) for key in keys)}
+        return replace(self, steps=tuple(step for step in self.steps if step.key not in gone))
+
+    def repeated(self, key: int) -> tuple[Draft, int]:
+        """Returns the draft with a copy of a block after it, and the key of the copy's begin."""
+        ends = sorted((self.index(key) or 0, self.index(self.partner(key)) or 0))
+        copies = [Step(next(_KEYS), step.waypoint) for step in self.steps[ends[0] : ends[1] + 1]]
+        at = ends[1] + 1
+        return replace(self, steps=(*self.steps[:at], *copies, *self.steps[at:])), copies[0].key
+
+    def partner(self, key: int) -> int | None:
+        """Returns the key of the end of the block that a step begins, or of its begin; None for any other step."""
+        opened: list[int] = []
+        for step in self.steps:
+            if step.waypoint.type in BLOCKS:
+                opened.append(step.key)
+            elif step.waypoint.type == "end" and opened:
+                begin = opened.pop()
+                if key in (begin, step.key):
+                    return step.key if key == begin else begin
+        return None
+
+    @property
+    def depths(self) -> tuple[int, ...]:
+        """Number of blocks that each step is in."""
+        found, depth = list[int](), 0
+        for step in self.steps:
+            depth -= step.waypoint.type == "end" and depth > 0
+            found.append(depth)
+            depth += step.waypoint.type in BLOCKS
+        return tuple(found)
 
     def moved(self, key: int, to: int) -> Draft:
         """Returns the draft with a step at another index, from 0, or at the nearest end."""
@@ -297,3 +336,28 @@ def describe_place(plan: Plan, time: float) -> Message | None:
         return message("program.at_start")
     kind = message(f"program.type.{plan.program.waypoints[number - 1].type}")
     return message("program.at", number=number, count=len(plan.program.waypoints), kind=kind)
+
+
+def describe_step(waypoint: Waypoint) -> Message:
+    """Returns what a step does at which nothing moves, in a few words."""
+    level = message(f"program.level.{'on' if waypoint.level else 'off'}")
+    name = waypoint.text or ""
+    match waypoint.type:
+        case "wait":
+            return message("program.step.wait", seconds=f"{waypoint.dwell:g}")
+        case "input":
+            return message(
+                "program.step.input", signal=waypoint.signal, level=level, seconds=f"{waypoint.timeout or 0.0:g}"
+            )
+        case "output":
+            return message("program.step.output", signal=waypoint.signal, level=level)
+        case "tool":
+            jaws = message(f"program.jaws.{waypoint.jaws}")
+            return message("program.step.tool", jaws=jaws, seconds=f"{waypoint.dwell:g}")
+        case "repeat":
+            named = f" \N{EN DASH} {name}" if name else ""
+            if waypoint.signal is None:
+                return message("program.step.repeat", count=waypoint.count, name=named)
+            return message("program.step.until", count=waypoint.count, signal=waypoint.signal, level=level, name=named)
+        case _:
+            return message("program.step.text", text=name)

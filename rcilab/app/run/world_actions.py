@@ -19,7 +19,7 @@ from rcilab.core.errors import RcilabError
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.execution.simulation_status_poller import SimulationStatusPoller
 from rcilab.i18n.translator import message
-from rcilab.sim.api import DIRECTIONS, AutoLimit, Direction, LoopBack, Network, NetworkFaults, Press
+from rcilab.sim.api import DIRECTIONS, AutoLimit, Direction, LoopBack, Network, NetworkFaults, Press, SetInput
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -62,6 +62,14 @@ class SetWiring(Request):
     on: bool
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetVirtualInput(Request):
+    """Switch a digital input of our own controller, by its number."""
+
+    signal: int
+    level: bool
+
+
 class WorldActions:
     """Owned by the thread that changes the state; it never waits for the controller."""
 
@@ -78,6 +86,7 @@ class WorldActions:
             SetNetwork: self.set_network,
             PressSafety: self.press_safety,
             SetWiring: self.set_wiring,
+            SetVirtualInput: self.set_input,
         }
 
     def set_network(self, request: SetNetwork) -> None:
@@ -119,6 +128,16 @@ class WorldActions:
         watch.ask(_WIRING[request.name](request.on))
         self._is_rewired |= request.name == "loop_back"
         self._store.update(world=replace(self._store.state.world, **{request.name: request.on}))
+
+    def set_input(self, request: SetVirtualInput) -> None:
+        """Switches an input of our own controller, which no longer follows an output that it is wired to."""
+        watch = self._require_watch()
+        if watch is None:
+            return
+        if self._store.state.world.loop_back:
+            self.set_wiring(SetWiring(name="loop_back", on=False))
+        watch.ask(SetInput(request.signal, request.level))
+        self._is_rewired = True
 
     def tick(self, status: SupervisorStatus) -> None:
         """Follows the current controller and its reports; a new one has a good network."""

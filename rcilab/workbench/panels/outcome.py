@@ -12,6 +12,7 @@ from rcilab.core.cycle_log import state_cycles
 from rcilab.core.fault import name_faults
 from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.translator import Remark
+from rcilab.makers.maker import capabilities_of
 from rcilab.recording.html_facts import describe_goal, describe_stop
 from rcilab.workbench.widgets import esc, esc_names
 
@@ -33,6 +34,9 @@ def progress_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     )
     if status.code == "moving.held":
         sentence = text("run.held", place=f"{status.motion_plan_time:.1f}")
+    if status.awaited is not None:
+        names = capabilities_of(state.model).inputs
+        sentence = text("program.waiting", signal=names[status.awaited])
     duration = status.motion_duration if state.plan is None else state.plan.motion.duration
     share = min(max(status.motion_plan_time / duration, 0.0), 1.0)
     return f'<p class="rl-note" role="status">{esc(sentence)}</p>{_bar(share)}'

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.app.program.edit_actions import EditProgram
+from rcilab.app.program.new_steps import NEW_STEPS
 from rcilab.app.program.program_actions import CancelProgram, PlanProgram
 from rcilab.app.program.program_draft import Draft, Note, ProgramState, describe_place, number_at, placed
 from rcilab.app.program.waypoint_fields import WAYPOINT_FIELDS
@@ -53,6 +54,14 @@ class ProgramPanel:
                     text(f"program.add_{source}"), icon=icon, hint=text(f"program.add_{source}_hint")
                 )
                 on_press(button, ask, _edit("add", source=source))
+        with gui.add_folder(text("program.insert_title")):
+            gui.add_html('<i class="rl-pairs rl-worded rl-bare"></i>')
+            kinds = {
+                text(f"program.new.{kind}"): kind for kind in NEW_STEPS if kind != "nullspace" or state.model.redundancy
+            }
+            chosen = gui.add_dropdown(text("program.insert_kind"), tuple(kinds), hint=text("program.insert_hint"))
+            insert = gui.add_button(text("program.insert"), icon="plus", color="gray", hint=text("program.insert_hint"))
+            on_press(insert, ask, lambda page: EditProgram(page=page, what="insert", type=kinds.get(chosen.value, "")))
         self._list = Html(gui)
         with gui.add_folder(text("program.tools")):
             gui.add_html('<i class="rl-tools rl-bare"></i>')

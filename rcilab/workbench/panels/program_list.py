@@ -6,7 +6,7 @@ import math
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from rcilab.app.program.program_draft import Draft, Note, target_in_base
+from rcilab.app.program.program_draft import Draft, Note, describe_step, target_in_base
 from rcilab.app.program.waypoint_fields import arm_angle_of
 from rcilab.app.text import Text
 from rcilab.core.errors import RcilabError
@@ -61,7 +61,7 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text, win
     noted = {note.key: sentence for note, sentence in zip(notes, _sentences(notes, text), strict=True)}
     count = len(draft.steps)
     window = range(count) if window is None else window
-    rows = [_start_row(draft, arm, running == 0, text), _room(window.start)]
+    rows, depths = [_start_row(draft, arm, running == 0, text), _room(window.start)], draft.depths
     for number in range(window.start + 1, window.stop + 1):
         step = draft.steps[number - 1]
         chosen, failed = step.key == state.program.selected, step.key == state.program.failed
@@ -71,7 +71,8 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text, win
             sign = f'<em title="{esc(text("program.frame_missing", frame=step.waypoint.frame))}">!</em>'
         if step.key in noted:
             sign += f'<i title="{noted[step.key]}">{_NOTED}</i>'
-        cells = (f"{number}{sign}", *_cells(step.waypoint, arm, text))
+        cells = (f"{number}{sign}", *_cells(step.waypoint, arm, text, depths[number - 1]))
+        look += " rl-instruction" if step.waypoint.is_instruction else ""
         rows.append(
             f'<div class="rl-step{look}" role="option" id="rl-step-{step.key}" data-key="{step.key}" '
             f'data-index="{number - 1}" aria-selected="{"true" if chosen else "false"}" draggable="true" '
@@ -132,8 +133,12 @@ def _head(label: str) -> str:
     return "".join(f"<b>{esc(part)}</b>" for part in parts) if len(parts) == 3 else esc(label)
 
 
-def _cells(waypoint: Waypoint, arm: RobotModel, text: Text) -> tuple[str, ...]:
-    kind = f'<i class="rl-kind rl-kind-{waypoint.type}">{esc(text(f"program.type.{waypoint.type}"))}</i>'
+def _cells(waypoint: Waypoint, arm: RobotModel, text: Text, depth: int) -> tuple[str, ...]:
+    inset = f' style="margin-left:{0.6 * depth:.1f}em"' if depth else ""
+    kind = f'<i class="rl-kind rl-kind-{waypoint.type}"{inset}>{esc(text(f"program.type.{waypoint.type}"))}</i>'
+    if waypoint.is_instruction:
+        said = text.render(describe_step(waypoint))
+        return kind, f'<span title="{esc(said)}">{esc(said)}</span>'
     psi = arm_angle_of(waypoint, arm)
     return (
         kind,
@@ -154,6 +159,8 @@ def _where(waypoint: Waypoint, arm: RobotModel, text: Text) -> str:
         return "?"
     if target is not None:
         return _lengths(tuple(target.position.tolist()), text)
+    if waypoint.type == "retreat":
+        return text.units.format(-(waypoint.distance or 0.0), "m.0f")
     if waypoint.type == "circle":
         return text.units.format_angle(math.tau if waypoint.angle is None else waypoint.angle, 0)
     return "ψ"

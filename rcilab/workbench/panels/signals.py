@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.app.run.drive_state import is_ours
 from rcilab.app.run.signal_actions import PressSignals, SetOutput, signal_rows
-from rcilab.app.run.world_actions import SetWiring
+from rcilab.app.run.world_actions import SetVirtualInput, SetWiring
 from rcilab.app.text import Text
 from rcilab.makers.maker import capabilities_of
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
@@ -29,16 +29,17 @@ class SignalsPanel:
         self._has_signals = bool(capabilities.outputs or capabilities.inputs)
         self._reboots = capabilities.reboots
         if self._has_signals:
-            self._build_signals(gui, capabilities.outputs)
+            self._build_signals(gui, capabilities.outputs, capabilities.inputs)
         if self._reboots:
             self._build_reboot(gui)
 
-    def _build_signals(self, gui: Any, names: tuple[str, ...]) -> None:
+    def _build_signals(self, gui: Any, names: tuple[str, ...], inputs: tuple[str, ...]) -> None:
         text, ask = self._text, self._ask
         with gui.add_folder(text("signals.title"), expand_by_default=False):
             output = gui.add_dropdown(text("signals.output"), names or ("—",), hint=text("signals.output_hint"))
             gui.add_html('<i class="rl-buttons rl-signals"></i>')
             self._buttons: list[Any] = []
+            self._inputs: list[Any] = []
             for word, icon, level in (("on", "toggle-right", True), ("off", "toggle-left", False)):
                 button = gui.add_button(text(f"signals.{word}"), icon=icon, color="blue" if level else "gray")
                 on_press(
@@ -50,6 +51,19 @@ class SignalsPanel:
             read = gui.add_button(text("signals.read"), icon="refresh", color="gray", hint=text("signals.read_hint"))
             on_press(read, ask, lambda page: PressSignals(page=page, what="read"))
             self._buttons.append(read)
+            if inputs:
+                chosen = gui.add_dropdown(text("signals.input"), inputs, hint=text("signals.input_hint"))
+                gui.add_html('<i class="rl-buttons rl-signals"></i>')
+                for word, icon, level in (("on", "toggle-right", True), ("off", "toggle-left", False)):
+                    button = gui.add_button(text(f"signals.{word}"), icon=icon, color="teal" if level else "gray")
+                    on_press(
+                        button,
+                        ask,
+                        lambda page, level=level: SetVirtualInput(
+                            page=page, signal=inputs.index(chosen.value), level=level
+                        ),
+                    )
+                    self._inputs.append(button)
             self._levels = Html(gui)
             gui.add_html(f'<p class="rl-note">{esc(text("signals.note"))}</p>')
             wired = gui.add_checkbox(text("signals.loop_back"), False, hint=text("signals.loop_back_hint"))
@@ -78,6 +92,8 @@ class SignalsPanel:
             self._levels.show(levels_html(state.model, status, text))
             self._wired.show(state.world.loop_back)
             self._wired.handle.disabled = not is_ours(status)
+            for button in self._inputs:  # Also during a motion, which may wait for one.
+                button.disabled = not is_ours(status)
         if self._reboots:
             self._show_reboot(state, status, is_ready=is_ready)
 

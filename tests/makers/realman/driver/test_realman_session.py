@@ -282,3 +282,23 @@ def test_signals_of_the_controller(robot):
     robot.set_output(3, True)
     assert robot.realman.api.rm_get_io_output()[1][3] == 1
     robot.set_output(3, False)
+
+
+def test_a_program_sets_and_awaits_signals(robot):
+    step, back = Waypoint.joint(HOME + 0.05, speed=0.3), Waypoint.joint(HOME, speed=0.3)
+    steps = (step, Waypoint.set_output(1), Waypoint.await_input(2, timeout=60.0), back, Waypoint.set_output(1, False))
+    motion = plan_program(robot.model, Program(model=robot.model.name, start=robot.state.q_c, waypoints=steps))
+    robot.simulation.set_input(2, False)
+    released = threading.Timer(1.5, robot.simulation.set_input, (2, True))
+    released.start()
+    run = robot.execute(motion)
+    released.join()
+    assert np.allclose(run.q_c[-1], motion.goal, atol=1e-3)
+    assert run.plan is not None
+    assert run.plan.duration > motion.duration
+    short = plan_program(
+        robot.model,
+        Program(model=robot.model.name, start=robot.state.q_c, waypoints=(step, Waypoint.await_input(3, timeout=0.1))),
+    )
+    with pytest.raises(DeadlineError, match=r"step 2: input .* was not on within 0\.1 s"):
+        robot.execute(short)
