@@ -45,4 +45,4 @@ def _channel(name: str, kind: SignalKind, signals: Sequence[Signal]) -> int:
             return signal.channel
     known = ", ".join(signal.name for signal in signals if signal.kind == kind)
     problem = f"is no {kind} of the cell; there are: {known or 'none'}"
-    raise InvalidValueError("signal", name, problem).coded("no_signal", name=name, kind=kind, known=known or "–")
+    raise InvalidValueError("signal", name, problem).coded("no_signal", name=name, known=known or "–")

@@ -148,10 +148,12 @@ class EventQueue:
         wanted = "on" if event.level else "off"
         step = f"step {event.row}: " if event.row else ""
         self._end_wait()
-        return DeadlineError(
+        error = DeadlineError(
             f"{step}input {name} was not {wanted} within {event.timeout:g} s, so the program ended there; look at the "
             "device, or allow more time"
-        ).coded("input_late", number=event.row, signal=name, level=wanted, seconds=f"{event.timeout:g}")
+        )
+        facts = {"number": event.row, "signal": name, "seconds": f"{event.timeout:g}"}
+        return error.coded("input_not_on", **facts) if event.level else error.coded("input_not_off", **facts)
 
 
 def _no_answer(what: str) -> DeadlineError:

@@ -67,7 +67,7 @@ def expand(waypoints: Sequence[Waypoint]) -> Expansion:
         builder.stand(builder.events[-1].row)
     if not builder.moves:
         raise InvalidValueError("waypoints", len(waypoints), "have no motion: add a joint move or a line").coded(
-            "no_motion"
+            "nothing_moves"
         )
     return Expansion(tuple(builder.moves), tuple(builder.events))
 

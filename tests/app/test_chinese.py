@@ -13,6 +13,7 @@ import pytest
 
 from rcilab.app.status_text import explain_error
 from rcilab.app.text import Text
+from rcilab.cell.cell import Cell
 from rcilab.conformance.check import check
 from rcilab.conformance.explain import explain_limit
 from rcilab.conformance.limit_violation import LimitViolation
@@ -48,7 +49,9 @@ from rcilab.sim.ideal_plant import IdealPlant
 MODEL = load_model("xMatePro7")
 HOME = np.array(MODEL.home)
 KEYS = (
-    "position wxyz frame psi via type model start speed blend dwell rounds q1 q2 joint line arc circle nullspace spline"
+    "position wxyz frame psi via type model start speed blend dwell rounds q1 q2 joint line arc circle nullspace "
+    "spline free retreat wait input output tool repeat group end comment approach "
+    "signal jaws true false gripper close"
 )
 ARMS = "xMatePro7 xMatePro3 xMate3 MuJoCo"
 WORDS = "rcilab RCI IP UDP URDF JSON CSV UTF StartMove AutomaticErrorRecovery MoveJ MoveL MoveC rci rad mm deg kg MB"
@@ -63,6 +66,10 @@ def moved(x: float, y: float = 0.0, z: float = 0.0) -> Pose:
 
 def program(*waypoints: Waypoint) -> Program:
     return Program(model=MODEL.name, start=tuple(HOME.tolist()), waypoints=waypoints)
+
+
+def planned(*waypoints: Waypoint) -> object:
+    return plan_program(MODEL, program(*waypoints))
 
 
 def bad_file(change: Callable[[str], str]) -> Callable[[], object]:
@@ -165,6 +172,17 @@ PROVOKED: dict[str, Callable[[], object]] = {
     "an arm angle for 6 axes": lambda: load_model("xMate3").inverse(load_model("xMate3").forward(np.zeros(6)), psi=0.1),
     "a frame that is missing": lambda: program(Waypoint.line(moved(0.05), frame="托盘")).resolved({}),
     "a program in frames": lambda: plan_program(MODEL, program(Waypoint.line(moved(0.05), frame="托盘"))),
+    "a signal without a cell": lambda: planned(Waypoint.set_output("灯")),
+    "a signal that the cell lacks": lambda: Cell.example("pick_place").resolve(program(Waypoint.set_output("灯"))),
+    "jaws without a cell": lambda: planned(Waypoint.use_tool("open")),
+    "jaws that the cell lacks": lambda: Cell(model=MODEL.name).resolve(program(Waypoint.use_tool("open"))),
+    "an end without a block": lambda: planned(Waypoint.end()),
+    "a block without an end": lambda: planned(Waypoint.repeat(2)),
+    "a program without a motion": lambda: planned(Waypoint.comment("")),
+    "no whole number of repetitions": lambda: Waypoint.repeat(0),
+    "a level that is none": lambda: Waypoint.set_output(0, 2),
+    "repetitions that end apart": lambda: planned(Waypoint.repeat(2, until=0), Waypoint.retreat(0.01), Waypoint.end()),
+    "a free motion without a cell": lambda: planned(Waypoint.free(HOME + 0.1)),
     "a frame of angles": lambda: Waypoint.joint(HOME, frame="托盘"),
     "a program for another arm": lambda: plan_program(load_model("xMatePro3"), program(Waypoint.line(moved(0.05)))),
     "a speed of nothing": lambda: plan_joint(MODEL, HOME, HOME + 0.1, speed=0.0),

@@ -96,7 +96,7 @@ def test_an_input_that_does_not_come_ends_the_program_in_words(robot, mode):
     motion = plan(GO, Waypoint.await_input(4, timeout=0.2), BACK)
     with pytest.raises(DeadlineError, match=r"step 2: input DI1_0 was not on within 0\.2 s") as failure:
         robot.execute(motion, mode=mode)
-    assert failure.value.code == "input_late"
+    assert failure.value.code == "input_not_on"
     assert np.allclose(robot.state.q, AWAY, atol=0.02)
     robot.move_j(MODEL.home, 0.8)
 

@@ -227,8 +227,9 @@ class EditActions:
         made = new_steps(request.type, T, psi, self._store.state.cell.cell)
         if len(made) == 1:
             self._history.change(*draft.inserted(made[0], selected))
-        elif made:
-            self._history.change(*draft.wrapped(*made, selected, selected))
+        elif len(made) == 2:
+            begin, end = made
+            self._history.change(*draft.wrapped(begin, end, selected, selected))
 
     def _place_before(self, draft: Draft, key: int | None) -> tuple[Pose, float | None]:
         """Returns pose and arm angle at the last step with a target up to a step, or at the start."""
@@ -239,6 +240,7 @@ class EditActions:
             target = target_in_base(step.waypoint, arm)
             if target is not None:
                 return target, arm_angle_of(step.waypoint, arm) or (0.0 if arm.redundancy else None)
+        assert draft.start is not None  # It has just been set.
         start = Waypoint(type="joint", q=draft.start)
         return arm.forward(draft.start), arm_angle_of(start, arm)
 

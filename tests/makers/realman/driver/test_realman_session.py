@@ -27,7 +27,7 @@ from rcilab.makers.configuration import ControllerParameters, RobotConfiguration
 from rcilab.makers.parameters import default_parameters
 from rcilab.makers.realman.errors import RealManError
 from rcilab.makers.realman.parameters import parameter_groups
-from rcilab.motion import plan_joint
+from rcilab.motion import Program, Waypoint, plan_joint, plan_program
 from rcilab.recording.run import load_run
 from tests.makers.realman.driver.conftest import HOME
 from tests.waiting import wait_for

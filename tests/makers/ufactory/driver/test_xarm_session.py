@@ -32,7 +32,7 @@ from rcilab.makers.ufactory.driver.settings import XArmSettings
 from rcilab.makers.ufactory.driver.state_reader import MOVING, READY
 from rcilab.makers.ufactory.errors import UfactoryError
 from rcilab.makers.ufactory.parameters import parameter_groups
-from rcilab.motion import plan_joint
+from rcilab.motion import Program, Waypoint, plan_joint, plan_program
 from rcilab.recording.run import load_run
 from tests.makers.ufactory.driver.conftest import HOME
 from tests.waiting import wait_for
