@@ -17,11 +17,18 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/cell.md").read_text(encoding="utf-8")
 SNIPPETS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 FRAMES = r"\[0\.5 0\.1 0\.4\]\n\[0\.55 0\.1  0\.4 \]\n"
-OUTPUTS = (r"", r"part and divider: distance from an obstacle .* they overlap, .*\n", FRAMES, r".*tool and divider.*\n")
+EVENTS = r"\['input', 'output', 'output', 'output'\]\n"
+OUTPUTS = (
+    r"",
+    r"part and divider: distance from an obstacle .* they overlap, .*\n",
+    FRAMES,
+    EVENTS,
+    r".*tool and divider.*\n",
+)
 
 
 @pytest.mark.parametrize(
-    ("snippet", "output"), [*zip(SNIPPETS, OUTPUTS, strict=True)], ids=["value", "plan", "frame", "session"]
+    ("snippet", "output"), [*zip(SNIPPETS, OUTPUTS, strict=True)], ids=["value", "plan", "frame", "signals", "session"]
 )
 def test_its_python_runs_as_printed(tmp_path: Path, snippet: str, output: str) -> None:
     result = subprocess.run(
