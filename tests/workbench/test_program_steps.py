@@ -122,6 +122,7 @@ def test_the_page_waits_for_an_input_that_a_button_switches():
         wait(lambda: status().code == "idle.arrived", "the end")
         goal = plan.motion.goal
         wait(lambda: np.allclose(status().q_c, goal, atol=1e-6), "the goal")
-        run = wait(lambda: state().last_run, "the run").run
+        wait(lambda: state().last_run is not None, "the run")
+        run = state().last_run.run
         assert run.plan.duration > plan.motion.duration
         assert MODEL.name == run.model.name
