@@ -165,7 +165,7 @@ BOXES = EDGES.replace(
 
 
 def test_no_words_lie_on_others(page):
-    """A waypoint's number, where the path leaves the box, and the verdict below the target, all at one place."""
+    """Three labels at one place, and one where the toolbar is."""
     labels = [
         page.bench.server.scene.add_label(
             f"/test_label/{k}", f"words that are long {k}", position=(0.3, 0.0, 0.3), anchor="bottom-left",
@@ -173,16 +173,26 @@ def test_no_words_lie_on_others(page):
         )
         for k in range(3)
     ]  # fmt: skip
+    labels.append(page.bench.server.scene.add_label("/test_label/3", "edge", position=(0.7, 0.4, 0.0)))
+    toolbar = page.tab.evaluate(
+        "2 * (document.getElementById('rl-toolbar').getBoundingClientRect().left - rcilabScene.box().left)"
+        " / rcilabScene.box().width - 1"
+    )
 
     def apart() -> bool:
         boxes = page.tab.evaluate(BOXES)
-        return len(boxes) >= 3 and not any(
-            a[0][0] < b[0][1] - 1e-4
-            and b[0][0] < a[0][1] - 1e-4
-            and a[1][0] < b[1][1] - 1e-4
-            and b[1][0] < a[1][1] - 1e-4
-            for i, a in enumerate(boxes)
-            for b in boxes[:i]
+        beside = all(across[1] <= toolbar + 1e-3 for across, _ in boxes)
+        return (
+            beside
+            and len(boxes) >= 4
+            and not any(
+                a[0][0] < b[0][1] - 1e-4
+                and b[0][0] < a[0][1] - 1e-4
+                and a[1][0] < b[1][1] - 1e-4
+                and b[1][0] < a[1][1] - 1e-4
+                for i, a in enumerate(boxes)
+                for b in boxes[:i]
+            )
         )
 
     try:
@@ -233,3 +243,36 @@ def test_a_finger_turns_the_camera_and_moves_a_handle_only_after_a_long_press(pa
     page.wait(lambda: not page.state.goal.target.is_close(target, 1e-3), "the target to follow")
     assert np.abs(np.subtract(tab.evaluate(where), before)).max() < 0.01, "not the camera"
     tab.mouse.move(5, 5)
+
+
+def test_a_phone_has_the_scene_above_the_panel_with_status_stop_program_and_run(page):
+    tab, size = page.tab, page.tab.viewport_size
+    box = """name => { const box = document.querySelector(name).getBoundingClientRect();
+        return [box.left, box.top, box.right, box.bottom]; }"""
+    tab.set_viewport_size({"width": 390, "height": 844})
+    try:
+        tab.locator("#root .mantine-Paper-root").first.wait_for(state="visible")
+        tab.wait_for_function(_FULL_WIDTH)
+        left, top, right, bottom = tab.evaluate(box, "#root canvas[data-engine]")
+        panel = tab.evaluate(box, '#root .mantine-Paper-root[style*="20em"]')
+        assert (left, right) == (panel[0], panel[2]) == (0, 390)
+        assert (bottom, panel[3]) == (panel[1], 844), "the panel below the scene"
+        assert bottom - top > 300
+        for name in ("#rl-stop", '.rl-chip[data-id="phase"]', "#rl-toolbar"):
+            edges = tab.evaluate(box, name)
+            assert 0 <= edges[0] < edges[2] <= 390
+        for name in ("Program", "Run"):
+            tab.get_by_role("tab", name=name).click()
+            tab.wait_for_function(
+                f"document.querySelector('[role=tab][aria-selected=true]').textContent.includes('{name}')"
+            )
+        assert page.button("Execute").is_visible()
+        assert tab.evaluate("document.documentElement.scrollWidth") == 390
+    finally:
+        tab.set_viewport_size(size)
+        page.wait_until_drawn()
+        page.open_tab("Jog")
+
+
+_FULL_WIDTH = """() => { const panel = document.querySelector('#root .mantine-Paper-root[style*="20em"]');
+  return panel && panel.getBoundingClientRect().width === 390 && rcilabScene.canvas(); }"""

@@ -23,7 +23,8 @@
       range.selectNodeContents(node);
       const area = range.getClientRects()[0], style = getComputedStyle(node.parentElement);
       if (!area) return;
-      Object.assign(context, { font: style.font, fillStyle: style.color, textBaseline: "middle" });
+      const font = [style.fontStyle, style.fontWeight, style.fontSize, style.fontFamily].join(" ");  // "" as a whole, with tabular digits.
+      Object.assign(context, { font, fillStyle: style.color, textBaseline: "middle" });
       context.fillText(node.data, area.left, area.top + area.height / 2);
       return;
     }

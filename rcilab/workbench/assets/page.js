@@ -57,6 +57,7 @@
 
   // Over the scene, wherever the panels have left it: that covers no tab, no button and no field.
   const place = () => {
+    if (!toast) return;  // A phone sizes a page before it is built.
     const canvas = document.querySelector("#root canvas[data-engine]"), scene = canvas && canvas.getBoundingClientRect();
     const fits = Boolean(scene) && scene.width >= NARROWEST;
     toast.classList.toggle("rl-below", !fits);
