@@ -1,11 +1,12 @@
 // Measuring in the scene: two picked points, with their distance and the angle between the picked faces. Points stay on
-// what they were picked on while it moves. A third pick begins again; Esc or the button ends it.
+// what they were picked on while it moves. A third pick begins again; Esc or the button ends it, and so does drawing a
+// path, which takes the clicks.
 (() => {
   "use strict";
   const STILL = 4;  // [px] A pointer that moves farther between down and up turns the camera.
   const AWAY = 14, EDGE = 8;  // [px] Of the card from the middle of the line, and from the edges of the scene.
   const scene = window.rcilabScene, NS = "http://www.w3.org/2000/svg";
-  let words = null, on = false, picks = [], lines = null, card = null, down = null, shown = "";
+  let words = null, on = false, isDrawing = false, picks = [], lines = null, card = null, down = null, shown = "";
 
   const shape = (name, at) => {
     const made = document.createElementNS(NS, name);
@@ -71,7 +72,7 @@
   };
 
   const turn = (wanted) => {
-    if (wanted === on || (wanted && !words)) return;
+    if (wanted === on || (wanted && (!words || isDrawing))) return;
     on = wanted;
     picks = [];
     shown = "";
@@ -81,7 +82,11 @@
     if (on) { build(); follow(); } else { lines.remove(); card.remove(); }
   };
 
-  window.addEventListener("rl-news", ({ detail }) => { if (detail.measure) { words = detail.measure; shown = ""; } });
+  window.addEventListener("rl-news", ({ detail }) => {
+    if (detail.measure) { words = detail.measure; shown = ""; }
+    if ("drawing" in detail) isDrawing = detail.drawing;
+    if (isDrawing) turn(false);
+  });
   window.addEventListener("rl-tool", ({ detail }) => { if (detail.name === "measure") turn(!on); });
   window.addEventListener("keydown", (event) => { if (event.key === "Escape") turn(false); });
   window.addEventListener("pointerdown", (event) => { down = on && event.target === scene.canvas() && event.button === 0 ? event : null; }, true);
