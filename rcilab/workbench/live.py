@@ -158,7 +158,10 @@ class Draw(PageMessage):
 class Edit(PageMessage):
     """An action in the list of waypoints."""
 
-    what: Literal["select", "move", "up", "down", "delete", "duplicate", "undo", "redo"]
+    what: Literal[
+        "select", "move", "up", "down", "delete", "duplicate", "undo", "redo", "toggle", "extend", "all", "copy", "cut",
+        "paste",
+    ]  # fmt: skip
     key: _Key
     """Key of the waypoint."""
     index: _Key

@@ -126,3 +126,60 @@ def test_the_page_waits_for_an_input_that_a_button_switches():
         run = state().last_run.run
         assert run.plan.duration > plan.motion.duration
         assert MODEL.name == run.model.name
+
+
+def select(bench: Bench, *numbers: int) -> None:
+    keys = [step.key for step in bench.program.draft.steps]
+    bench.edit("select", key=keys[numbers[0] - 1])
+    for number in numbers[1:]:
+        bench.edit("toggle", key=keys[number - 1])
+
+
+def selected(bench: Bench) -> list[int]:
+    keys = [step.key for step in bench.program.draft.steps]
+    return [keys.index(key) + 1 for key in bench.program.draft.chosen(bench.program.selected, bench.program.marked)]
+
+
+def test_several_steps_are_selected_edited_moved_copied_and_deleted_as_one(bench):
+    bench.load(SQUARE)
+    before = bench.program.draft
+    select(bench, 1, 3)
+    assert selected(bench) == [1, 3]
+    assert bench.type("speed", "7.5") is None
+    speeds = [step.waypoint.speed for step in bench.program.draft.steps]
+    assert (speeds[0], speeds[2]) == (0.075, 0.075)
+    assert speeds[1] == before.steps[1].waypoint.speed
+    assert selected(bench) == [1, 3]
+    bench.edit("undo")
+    assert bench.program.draft is before
+    select(bench, 1, 2)
+    bench.edit("down")
+    assert [step.key for step in bench.program.draft.steps[:3]] == [before.steps[k].key for k in (2, 0, 1)]
+    assert selected(bench) == [2, 3]
+    bench.edit("copy")
+    bench.edit("paste")
+    assert kinds(bench)[3:5] == [before.steps[k].waypoint.type for k in (0, 1)]
+    assert selected(bench) == [4, 5]
+    bench.edit("delete")
+    assert len(bench.program.draft.steps) == len(before.steps)
+    bench.edit("extend", key=bench.program.draft.steps[0].key)
+    bench.edit("cut")
+    bench.edit("undo")
+    bench.edit("all")
+    assert len(selected(bench)) == len(before.steps)
+    bench.edit("insert", type="group")
+    assert kinds(bench)[0] == "group"
+    assert kinds(bench)[-1] == "end"
+    listed = list_html(bench.state, bench.program.draft, None, Text("en"))
+    assert listed.count("rl-marked") == 0
+
+
+def test_steps_are_found_by_what_they_are(bench):
+    bench.edit("insert", type="input")
+    bench.edit("insert", type="comment")
+    assert bench.type("text", "Deburr the edge") is None
+    bench.edit("select", key=bench.program.draft.steps[0].key)
+    for typed, number in (("deburr", 4), ("part in", 3), ("2", 2), ("input", 3)):
+        assert bench.type("find", typed, key=0) is None
+        assert selected(bench) == [number]
+    assert bench.type("find", "lathe", key=0) == "program.not_found"

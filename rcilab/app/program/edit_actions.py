@@ -11,6 +11,7 @@ from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.program.new_steps import new_steps
 from rcilab.app.program.program_draft import MOST_ROUNDS, TYPES, Draft, placed, target_in_base, target_of, time_at
 from rcilab.app.program.program_history import ProgramHistory
+from rcilab.app.program.selection_actions import SelectionActions
 from rcilab.app.program.waypoint_fields import arm_angle_of, as_pose, default_via, proposed
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.status_text import explain_error
@@ -23,6 +24,8 @@ from rcilab.i18n.translator import Message, message
 from rcilab.motion.waypoint import ALLOWED, CHOICES, Waypoint
 
 LONGEST_NAME = 80
+COMMON = ("speed", "blend", "dwell", "approach", "timeout")
+"""Fields that are typed for all selected steps."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +34,8 @@ class EditProgram(Request):
 
     what: Literal[
         "select", "add", "teach", "via", "type", "frame", "delete", "duplicate", "up", "down", "move", "start", "aim",
-        "undo", "redo", "clear", "script", "tool", "insert", "choose",
+        "undo", "redo", "clear", "script", "tool", "insert", "choose", "toggle", "extend", "all", "copy", "cut",
+        "paste",
     ]  # fmt: skip
     key: int | None = None
     """Key of a step; None is the selected one."""
@@ -74,11 +78,10 @@ class EditActions:
 
     def __init__(self, store: Store, connection: PageConnection, goal: GoalActions, history: ProgramHistory) -> None:
         self._store, self._connection, self._goal, self._history = store, connection, goal, history
+        self.selection = SelectionActions(store, history)
         self._edits: dict[str, Callable[[EditProgram, int], None]] = {
             "select": self._select, "teach": self._teach, "via": self._via, "type": self._retype,
-            "frame": self._reframe, "delete": self._delete, "duplicate": self._duplicate, "aim": self._aim,
-            "up": lambda request, key: self._move(key, -1), "down": lambda request, key: self._move(key, 1),
-            "move": self._move_to, "choose": self._choose,
+            "frame": self._reframe, "aim": self._aim, "move": self._move_to, "choose": self._choose,
         }  # fmt: skip
 
     @property
@@ -101,6 +104,9 @@ class EditActions:
         }  # fmt: skip
         if request.what in whole:
             whole[request.what]()
+            return
+        if request.what in self.selection.edits:
+            self._edit_selection(request)
             return
         key = self._history.state.selected if request.key is None else request.key
         if key is None or self._draft.index(key) is None:
@@ -126,6 +132,13 @@ class EditActions:
             elif self._history.answer(request.field, parsed.problem) and parsed.value is not None:
                 self._history.interrupt()
                 self._history.set(rounds=int(parsed.value), planned=None, answer=None)
+        elif name == "find":
+            is_found = not request.text.strip() or self.selection.find(request.text)
+            self._history.answer(
+                request.field, None if is_found else message("program.not_found", typed=request.text[:40])
+            )
+        elif waypoint is not None and name in COMMON and int(key) == self._history.state.selected:
+            self._type_common(request, name)
         elif waypoint is not None:
             made = proposed(waypoint, name, request.text, self._draft.arm(self._store.state.model))
             if made is not None and self._history.answer(request.field, made if isinstance(made, Message) else None):
@@ -133,6 +146,26 @@ class EditActions:
                 if made == waypoint:  # Its plan stays valid.
                     return
                 self._history.change(self._draft.changed(int(key), made), int(key), typed=True)
+
+    def _type_common(self, request: TypeField, name: str) -> None:
+        """Takes a typed value for all selected steps that have this field."""
+        draft, arm = self._draft, self._draft.arm(self._store.state.model)
+        for key in self.selection.keys:
+            waypoint = draft.waypoint(key)
+            assert waypoint is not None
+            if name not in ALLOWED[waypoint.type]:
+                continue
+            made = proposed(waypoint, name, request.text, arm)
+            if isinstance(made, Message):
+                self._history.answer(request.field, made)
+                return
+            if made is not None and made != waypoint:
+                draft = draft.changed(key, made)
+        self._history.answer(request.field, None)
+        if draft is not self._draft:
+            marked = self._history.state.marked
+            self._history.change(draft, self._history.state.selected, typed=True)
+            self._history.set(marked=marked)
 
     @property
     def _draft(self) -> Draft:
@@ -229,7 +262,8 @@ class EditActions:
             self._history.change(*draft.inserted(made[0], selected))
         elif len(made) == 2:
             begin, end = made
-            self._history.change(*draft.wrapped(begin, end, selected, selected))
+            keys = self.selection.keys or (None,)
+            self._history.change(*draft.wrapped(begin, end, keys[0], keys[-1]))
 
     def _place_before(self, draft: Draft, key: int | None) -> tuple[Pose, float | None]:
         """Returns pose and arm angle at the last step with a target up to a step, or at the start."""
@@ -267,7 +301,7 @@ class EditActions:
         """Selects a step; if the plan is that of the program, the preview moves there."""
         if key != self._history.state.selected:
             self._store.clear_problems("program.")
-        self._history.set(selected=key, scrolled=None)
+        self._history.set(selected=key, marked=frozenset(), scrolled=None)
         state, index = self._store.state, self._draft.index(key)
         plan = state.plan
         if plan is None or plan.program is None or index is None or self._history.state.planned is not self._draft:
@@ -322,24 +356,15 @@ class EditActions:
     def _draft_has_cell(self) -> bool:
         return self._store.state.cell.cell is not None
 
-    def _delete(self, request: EditProgram, key: int) -> None:
-        index = self._draft.index(key) or 0
-        draft = self._draft.without(key)
-        left = draft.steps[min(index, len(draft.steps) - 1)].key if draft.steps else None
-        self._history.change(draft, left)
-
-    def _duplicate(self, request: EditProgram, key: int) -> None:
-        waypoint = self._draft.waypoint(key)
-        assert waypoint is not None
-        if self._draft.partner(key) is None:
-            self._history.change(*self._draft.inserted(waypoint, key))
-        else:
-            self._history.change(*self._draft.repeated(key))
-
-    def _move(self, key: int, step: int) -> None:
-        index = self._draft.index(key)
-        if index is not None and 0 <= index + step < len(self._draft.steps):
-            self._history.change(self._draft.moved(key, index + step), key)
+    def _edit_selection(self, request: EditProgram) -> None:
+        """Edits the selected steps; one that is named and not among them becomes the selection."""
+        needs = request.what in ("delete", "duplicate", "up", "down", "copy", "cut")
+        if needs and request.key is not None and request.key not in self.selection.keys:
+            self._history.set(selected=request.key, marked=frozenset())
+        if needs and not self.selection.keys:
+            self._store.notify("warn", message("program.select"))
+            return
+        self.selection.edits[request.what](request)
 
     def _move_to(self, request: EditProgram, key: int) -> None:
         if self._draft.index(key) != request.index:

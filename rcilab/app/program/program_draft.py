@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import count
@@ -86,12 +87,28 @@ class Draft:
         gone = {*keys, *(self.partner(key) for key in keys)}
         return replace(self, steps=tuple(step for step in self.steps if step.key not in gone))
 
-    def repeated(self, key: int) -> tuple[Draft, int]:
-        """Returns the draft with a copy of a block after it, and the key of the copy's begin."""
-        ends = sorted((self.index(key) or 0, self.index(self.partner(key)) or 0))
-        copies = [Step(next(_KEYS), step.waypoint) for step in self.steps[ends[0] : ends[1] + 1]]
-        at = ends[1] + 1
-        return replace(self, steps=(*self.steps[:at], *copies, *self.steps[at:])), copies[0].key
+    def chosen(self, selected: int | None, marked: frozenset[int]) -> tuple[int, ...]:
+        """Returns the keys of the selected steps, in their order."""
+        return tuple(step.key for step in self.steps if step.key == selected or step.key in marked)
+
+    def with_partners(self, keys: Sequence[int]) -> tuple[Step, ...]:
+        """Returns steps in their order, with the whole of each block of which one has an end."""
+        ends = {key: self.partner(key) for key in keys}
+        wanted = set(keys)
+        for key, partner in ends.items():
+            low, high = sorted((self.index(key) or 0, self.index(partner) or 0)) if partner is not None else (0, -1)
+            wanted |= {step.key for step in self.steps[low : high + 1]}
+        return tuple(step for step in self.steps if step.key in wanted)
+
+    def shifted(self, keys: Sequence[int], step: int) -> Draft:
+        """Returns the draft with steps moved up (-1) or down (1) by one; itself if they are at the end."""
+        indices = [index for index, one in enumerate(self.steps) if one.key in set(keys)]
+        if not indices or not (0 <= indices[0] + step and indices[-1] + step < len(self.steps)):
+            return self
+        steps = list(self.steps)
+        for index in indices if step < 0 else reversed(indices):
+            steps[index], steps[index + step] = steps[index + step], steps[index]
+        return replace(self, steps=tuple(steps))
 
     def partner(self, key: int) -> int | None:
         """Returns the key of the end of the block that a step begins, or of its begin; None for any other step."""
@@ -208,6 +225,8 @@ class ProgramState:
     draft: Draft = field(default_factory=Draft)
     selected: int | None = None
     """Key of a step."""
+    marked: frozenset[int] = frozenset()
+    """Keys of further selected steps."""
     scrolled: int | None = None
     """Index of the step to which the list was scrolled; None: the selected step is in sight."""
     can_undo: bool = False

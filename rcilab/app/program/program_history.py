@@ -119,7 +119,8 @@ class ProgramHistory:
         if draft.index(selected) is None:
             selected = draft.steps[-1].key if draft.steps else None
         self.set(
-            draft=draft, selected=selected, scrolled=None, can_undo=bool(history.past), can_redo=bool(history.future),
-            failed=None, notes=(), tone="warn", answer=message("program.changed") if is_dropped else None,
+            draft=draft, selected=selected, marked=frozenset(), scrolled=None, can_undo=bool(history.past),
+            can_redo=bool(history.future), failed=None, notes=(), tone="warn",
+            answer=message("program.changed") if is_dropped else None,
         )  # fmt: skip
         self._store.clear_problems("program.")

@@ -11,24 +11,25 @@
   const find = (list, holds) => rows(list).findIndex(holds);
   const chosen = (list) => {
     const mine = performance.now() - since < LATE ? find(list, (row) => row.dataset.key === picked) : -1;
-    return mine >= 0 ? mine : find(list, (row) => row.getAttribute("aria-selected") === "true");
+    return mine >= 0 ? mine : find(list, (row) => row.dataset.key === list.dataset.selected);
   };
 
   const say = (what, key, index = 0) => {
     if (what === "select") { picked = key; since = performance.now(); }
-    if (["delete", "duplicate", "undo", "redo"].includes(what)) picked = null;  // Another row will be chosen for us.
+    if (!["select", "up", "down", "move"].includes(what)) picked = null;  // Another row will be chosen for us.
     window.dispatchEvent(new CustomEvent("rl-act", { detail: { kind: "edit", what, key: Number(key), index: Number(index) } }));
   };
 
   const choose = (list, index) => {
     const all = rows(list), row = all[Math.min(Math.max(index, 0), all.length - 1)];
     if (!row) return;
+    rows(list).forEach((other) => other.classList.remove("rl-marked"));
     mark(list, row);
     say("select", row.dataset.key);
   };
 
   const mark = (list, row) => {
-    rows(list).forEach((other) => other.setAttribute("aria-selected", other === row ? "true" : "false"));
+    rows(list).forEach((other) => other.setAttribute("aria-selected", other === row || other.classList.contains("rl-marked") ? "true" : "false"));
     list.setAttribute("aria-activedescendant", row.id);
     if (row.dataset.key !== revealed) reveal(row);
     revealed = row.dataset.key;
@@ -50,7 +51,11 @@
       return;
     }
     const list = listOf(event.target), row = list && event.target.closest("[data-key]");
-    if (row) { list.focus(); had = true; choose(list, rows(list).indexOf(row)); }
+    if (!row) return;
+    list.focus();
+    had = true;
+    if (event.shiftKey || event.ctrlKey || event.metaKey) say(event.shiftKey ? "extend" : "toggle", row.dataset.key);
+    else choose(list, rows(list).indexOf(row));
   });
 
   document.addEventListener("keydown", (event) => {
@@ -63,6 +68,11 @@
     else if (control && name === "z") say(event.shiftKey ? "redo" : "undo", 0);
     else if (control && name === "y") say("redo", 0);
     else if (control && name === "d") say("duplicate", key);
+    else if (control && "acxv".includes(name)) say({ a: "all", c: "copy", x: "cut", v: "paste" }[name], key);
+    else if (event.shiftKey && (name === "ArrowUp" || name === "ArrowDown")) {
+      const other = rows(list)[at + (name === "ArrowUp" ? -1 : 1)];
+      if (other) say("extend", other.dataset.key);
+    }
     else if (control || event.altKey) return;
     else if (at < 0 && ["ArrowUp", "ArrowDown"].includes(name)) say("select", list.dataset.selected);  // It was scrolled away.
     else if (name === "ArrowUp") choose(list, at - 1);

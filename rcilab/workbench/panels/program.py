@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 _TOOLS = (
     ("up", "arrow-up"), ("down", "arrow-down"), ("duplicate", "copy"), ("delete", "trash"), ("undo", "arrow-back-up"),
-    ("redo", "arrow-forward-up"),
+    ("redo", "arrow-forward-up"), ("copy_steps", "clipboard-copy"), ("paste", "clipboard"),
 )  # fmt: skip
 _SAME = math.radians(1e-4)  # [rad] A joint at a smaller distance is at the start of the program.
 _MOMENT = 0.25  # [s] A shorter progress bar would only flicker.
@@ -62,13 +62,15 @@ class ProgramPanel:
             chosen = gui.add_dropdown(text("program.insert_kind"), tuple(kinds), hint=text("program.insert_hint"))
             insert = gui.add_button(text("program.insert"), icon="plus", color="gray", hint=text("program.insert_hint"))
             on_press(insert, ask, lambda page: EditProgram(page=page, what="insert", type=kinds.get(chosen.value, "")))
+            box = gui.add_text(text("program.find"), "", hint=text("program.find_hint"))
+            self._find = NumberField(box, ask, "program.0.find")
         self._list = Html(gui)
         with gui.add_folder(text("program.tools")):
             gui.add_html('<i class="rl-tools rl-bare"></i>')
             self._tools: dict[str, Any] = {}
             for what, icon in _TOOLS:
                 button = gui.add_button(text(f"program.{what}"), icon=icon, color="gray", hint=text(f"program.{what}"))
-                on_press(button, ask, _edit(what))
+                on_press(button, ask, _edit(what.removesuffix("_steps")))
                 self._tools[what] = button
         with gui.add_folder(text("program.plan_title")):
             gui.add_html('<i class="rl-buttons"></i>')
@@ -99,14 +101,23 @@ class ProgramPanel:
         index, count = draft.index(program.selected), len(draft.steps)
         wanted = index if program.scrolled is None else program.scrolled
         self._window = window_around(self._window, count, wanted)
-        drawn = (in_base, program.selected, program.failed, program.notes, running, state.model, self._window)
+        drawn = (
+            in_base,
+            program.selected,
+            program.failed,
+            program.notes,
+            running,
+            state.model,
+            self._window,
+            program.marked,
+        )
         if drawn != self._drawn:  # The positions of waypoints take some time to compute.
             self._drawn = drawn
             self._list.show(list_html(state, in_base, running, text, self._window))
         able = {
             "up": index is not None and index > 0, "down": index is not None and index < count - 1,
             "duplicate": index is not None, "delete": index is not None, "undo": program.can_undo,
-            "redo": program.can_redo,
+            "redo": program.can_redo, "copy_steps": index is not None, "paste": count > 0,
         }  # fmt: skip
         for what, button in self._tools.items():
             button.disabled = not able[what]
@@ -114,6 +125,7 @@ class ProgramPanel:
         self._plan.disabled = not count or planning or is_moving(status)
         self._upto.disabled = index is None or planning or is_moving(status)
         self._loop.show(state.loop)
+        self._find.show("", state.problems.get(self._find.field), state.entered)
         self._rounds.show(str(program.rounds), state.problems.get(self._rounds.field), state.entered)
         now = time.monotonic()
         self._began = self._began if planning else now
@@ -141,7 +153,8 @@ class ProgramPanel:
         """Returns the fields of numbers, and their labels: the rounds, and those of the selected waypoint."""
         own = f"program.{program.selected}."
         waypoint = [(f"{own}{name}", self._text(f"program.field.{name}")) for name in WAYPOINT_FIELDS]
-        return [("program.0.rounds", self._text("program.rounds")), *waypoint]
+        whole = [(f"program.0.{name}", self._text(f"program.{name}")) for name in ("rounds", "find")]
+        return [*whole, *waypoint]
 
     def _elsewhere(self, draft: Draft, status: SupervisorStatus) -> str:
         """Returns whether the program starts at the arm's position, as text."""

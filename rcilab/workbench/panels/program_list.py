@@ -65,7 +65,12 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text, win
     for number in range(window.start + 1, window.stop + 1):
         step = draft.steps[number - 1]
         chosen, failed = step.key == state.program.selected, step.key == state.program.failed
-        look = (" rl-failed" if failed else "") + (" rl-running" if number == running else "")
+        marked = step.key in state.program.marked
+        look = (
+            (" rl-marked" if marked else "")
+            + (" rl-failed" if failed else "")
+            + (" rl-running" if number == running else "")
+        )
         sign = f'<em title="{esc(text("program.failed"))}">!</em>' if failed else ""
         if step.waypoint.frame is not None:
             sign = f'<em title="{esc(text("program.frame_missing", frame=step.waypoint.frame))}">!</em>'
@@ -75,14 +80,15 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text, win
         look += " rl-instruction" if step.waypoint.is_instruction else ""
         rows.append(
             f'<div class="rl-step{look}" role="option" id="rl-step-{step.key}" data-key="{step.key}" '
-            f'data-index="{number - 1}" aria-selected="{"true" if chosen else "false"}" draggable="true" '
+            f'data-index="{number - 1}" aria-selected="{"true" if chosen or marked else "false"}" draggable="true" '
             f'aria-posinset="{number}" aria-setsize="{count}">'
             + "".join(f"<span>{cell}</span>" for cell in cells)
             + "</div>"
         )
     rows.append(_room(count - window.stop))
     return (
-        f'<div class="rl-steps-head" aria-hidden="true">{heads}</div><div class="rl-steps" role="listbox" tabindex="0" '
+        f'<div class="rl-steps-head" aria-hidden="true">{heads}</div>'
+        '<div class="rl-steps" role="listbox" aria-multiselectable="true" tabindex="0" '
         f'aria-label="{esc(text("program.list"))}" aria-activedescendant="rl-step-{state.program.selected}" '
         f'data-first="{draft.steps[0].key}" data-last="{draft.steps[-1].key}" '
         f'data-selected="{state.program.selected or 0}">'

@@ -94,7 +94,12 @@ class WaypointPanel:
         values = _values(waypoint, arm)
         self._folder.visible = waypoint.type != "end"
         self._teach.visible = waypoint.type in TYPES
-        self._folder.label = self._text("program.selected", number=index + 1)
+        several = len(draft.chosen(key, state.program.marked))
+        self._folder.label = (
+            self._text("program.selected", number=index + 1)
+            if several == 1
+            else self._text("program.selected_many", count=several)
+        )
         self._pose.visible, self._via.visible = "x" in values, waypoint.type == "arc"
         self._circle.visible = waypoint.type == "circle"
         self._show_kind(waypoint)
