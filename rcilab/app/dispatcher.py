@@ -20,6 +20,7 @@ from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.goal.named_pose_actions import NamedPoseActions
 from rcilab.app.jog.jog_actions import JogActions
 from rcilab.app.learn.learn_actions import LearnActions
+from rcilab.app.link.link_actions import LinkActions
 from rcilab.app.program.program_actions import ProgramActions
 from rcilab.app.request import Moving, Request, TypeField
 from rcilab.app.run.export_actions import Deliver, ExportActions
@@ -117,6 +118,7 @@ class Dispatcher:
         self._program = ProgramActions(store, connection, self._goal)
         self._check = CheckActions(store, connection, self._goal, self._program)
         self._learn = LearnActions(store, connection)
+        self._link = LinkActions(store, connection, self.run, self._program, self._cell)
         self._view = ViewActions(store)
         self._control_lock = ControlLockActions(store, connection, presence or ClientHeartbeat())
         self._scene = SceneActions(store, self._goal)
@@ -134,6 +136,7 @@ class Dispatcher:
             self._goal, self._poses, self._scene, self._setup, self._cell, self._jog, self._push, self._program,
             self._program.editing, self._program.paths, self._check, self._learn, self.run, self._target_robot,
             self._mode, self._world, self._signals, self._view, self._export, self._folder, self._control_lock,
+            self._link,
         )  # fmt: skip
         self._handlers = {kind: act for feature in features for kind, act in feature.handlers.items()}
         self._handlers |= {

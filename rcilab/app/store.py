@@ -13,6 +13,7 @@ from rcilab.app.check.check_state import CheckState
 from rcilab.app.control_lock import ControlLock
 from rcilab.app.jog.jog_state import JogState
 from rcilab.app.learn.learn_state import LearnState
+from rcilab.app.link.page_link import LinkQuestion
 from rcilab.app.program.path_state import PathState
 from rcilab.app.program.program_draft import ProgramState
 from rcilab.app.run.active_force import PushState
@@ -65,6 +66,8 @@ class UiState(AppState):
     paths: PathState = field(default_factory=PathState)
     check: CheckState = field(default_factory=CheckState)
     learn: LearnState = field(default_factory=LearnState)
+    link: LinkQuestion | None = None
+    """The link that replaces something once its page has confirmed that."""
     folder: RunsFolder = RunsFolder()
     export: Export | None = None
     """The export in progress."""

@@ -20,6 +20,7 @@ from rcilab.app.control_lock_actions import AnswerControls, PageClosed, PageOpen
 from rcilab.app.dispatcher import Dispatcher
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import ChooseBranch
+from rcilab.app.link.link_actions import AnswerLink, OpenLink
 from rcilab.app.program.edit_actions import EditProgram, ShowRows
 from rcilab.app.program.path_actions import DrawPath
 from rcilab.app.request import Request
@@ -232,6 +233,10 @@ class Workbench:
                 return TakeControls(page=page)
             case live.Answer(yes):
                 return AnswerControls(page=page, yes=yes)
+            case live.Link(text):
+                return OpenLink(page=page, text=text)
+            case live.AnswerLink(yes):
+                return AnswerLink(page=page, yes=yes)
             case live.Software():
                 return DrawInSoftware(page=page)
             case live.Peek(branch):

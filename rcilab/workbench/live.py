@@ -16,11 +16,13 @@ import msgspec
 from websockets.asyncio.server import broadcast
 from websockets.exceptions import ConnectionClosed
 
+from rcilab.app.link.page_link import LONGEST_LINK
+
 LIVE_PATH = "/rcilab/live"
 HEARTBEAT_PATH = "/rcilab/heartbeat"
 """Path for the heartbeat thread of a page: its connection gets heartbeats only."""
 
-_LARGEST_MESSAGE = 4096  # [bytes] The longest message of a page has some hundreds.
+_LARGEST_MESSAGE = 12_000  # [bytes] A link has up to 8000; the other messages of a page have some hundreds.
 
 _Index: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=99)]
 _Key: TypeAlias = Annotated[int, msgspec.Meta(ge=0, lt=10**9)]
@@ -108,6 +110,18 @@ class Answer(PageMessage):
     yes: bool
 
 
+class Link(PageMessage):
+    """The page was opened with a link to a view."""
+
+    text: Annotated[str, msgspec.Meta(max_length=LONGEST_LINK)]
+
+
+class AnswerLink(PageMessage):
+    """Whether a link that replaces something is opened."""
+
+    yes: bool
+
+
 class Software(PageMessage):
     """The browser has no graphics card."""
 
@@ -183,6 +197,8 @@ _DECODER = msgspec.json.Decoder(
     | Entered
     | Take
     | Answer
+    | Link
+    | AnswerLink
     | Software
     | Peek
     | Elbow

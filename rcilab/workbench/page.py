@@ -49,6 +49,7 @@ def decorate(index: bytes, quality: str = "full") -> bytes:
         "jog_devices",
         "draw",
         "palette",
+        "link",
     )
     script = b"\n".join((assets / f"{name}.js").read_bytes() for name in scripts)
     head = b"<style>" + style + b"</style><script>" + script + b"</script></head>"
@@ -77,6 +78,18 @@ def send_commands(client: viser.ClientHandle, controls: list[Control]) -> None:
         for one in controls
     ]
     run_javascript(client, f"window.rcilabCommands?.({json.dumps(facts)});")
+
+
+def send_link(client: viser.ClientHandle, link: str, said: str, tone: str) -> None:
+    """Makes a page copy a link to itself, and say so.
+
+    Args:
+        client: The page.
+        link: Text of the link; "" copies nothing.
+        said: What the page says then.
+        tone: Tone of that.
+    """
+    run_javascript(client, f"window.rcilabLink?.({json.dumps({'link': link, 'text': said, 'tone': tone})});")
 
 
 def dress(server: viser.ViserServer, theme: str) -> None:

@@ -31,6 +31,7 @@ from rcilab.workbench.panels.jog import JogPanel, ToolJogPanel
 from rcilab.workbench.panels.learn import LearnPanel
 from rcilab.workbench.panels.learn_demo import LearnDemoPanel
 from rcilab.workbench.panels.learn_lesson import LearnLessonPanel
+from rcilab.workbench.panels.link import LinkPanel
 from rcilab.workbench.panels.mode import ModePanel
 from rcilab.workbench.panels.path import PathPanel
 from rcilab.workbench.panels.path_type import PathTypePanel
@@ -70,7 +71,7 @@ _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, ArmStatePanel, PosesPanel),
     ("tab.target", "current-location", TargetPanel, ElbowPanel, BranchesPanel, PathTypePanel),
-    ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel, PathPanel),
+    ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel, PathPanel, LinkPanel),
     ("tab.setup", "tool", SetupPanel, SetupNumbersPanel, SoftLimitsPanel),
     ("tab.cell", "box", CellPanel, CellEntryPanel, CellRestPanel, CellFilePanel),
     ("tab.check", "clipboard-check", CheckPanel),

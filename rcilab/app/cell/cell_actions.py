@@ -162,7 +162,7 @@ class CellActions:
             self._store.set_problem(FILE_FIELD, other)
             return
         sentence = message("cell.loaded", name=name, count=len(cell.obstacles))
-        self._when_prepared(cell, lambda: self._take(cell, sentence))
+        self._when_prepared(cell, lambda: self.take(cell, sentence))
 
     def add_mesh(self, request: AddMesh) -> None:
         """Adds an obstacle from a file with a mesh."""
@@ -267,6 +267,16 @@ class CellActions:
             change = partial(with_field, cell, entry, name)
             self._type_number(request, low, high, "deg" if is_angle else "mm", change)
 
+    def take(self, cell: Cell, sentence: Message) -> None:
+        """Takes a loaded cell, and its tool and load for the arm; undo restores the previous one."""
+        model = self._store.state.model
+        if not self._mount(cell, model):
+            return
+        self._store.clear_problems("cell.")
+        self._change(cell)
+        self._set(selected=None)
+        self._store.notify("good", sentence)
+
     def restore(self, cell: Cell) -> None:
         """Restores a cell of the previous workbench, of any arm."""
         self._histories[cell.model] = _History(cell)
@@ -351,17 +361,7 @@ class CellActions:
         except RcilabError as error:
             self._store.notify("warn", explain_error(error))
             return
-        self._take(cell, message("cell.loaded", name=cell.name, count=len(cell.obstacles)))
-
-    def _take(self, cell: Cell, sentence: Message) -> None:
-        """Takes a loaded cell, and its tool and load for the arm."""
-        model = self._store.state.model
-        if not self._mount(cell, model):
-            return
-        self._store.clear_problems("cell.")
-        self._change(cell)
-        self._set(selected=None)
-        self._store.notify("good", sentence)
+        self.take(cell, message("cell.loaded", name=cell.name, count=len(cell.obstacles)))
 
     def _hold(self, cell: Cell, part: str) -> None:
         holding = cell.holding(part)

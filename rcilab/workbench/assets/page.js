@@ -95,8 +95,8 @@
     question.hidden = true;
     question.setAttribute("role", "alertdialog");
     question.append(...["p", "button", "button"].map((kind) => document.createElement(kind)));
-    question.children[1].addEventListener("click", () => send({ kind: "answer", yes: true }));
-    question.children[2].addEventListener("click", () => send({ kind: "answer", yes: false }));
+    question.children[1].addEventListener("click", () => send({ kind: said.question.kind, yes: true }));
+    question.children[2].addEventListener("click", () => send({ kind: said.question.kind, yes: false }));
     chips = bar.querySelector("#rl-chips");
     toast = document.createElement("div");
     toast.id = "rl-toast";
@@ -243,6 +243,7 @@
     };
   };
 
+  window.addEventListener("rl-toast", (event) => show(event.detail));
   window.addEventListener("rl-say", (event) => send(event.detail));  // What the other scripts of the page have to say.
   window.addEventListener("rl-notice", (event) => show(event.detail));  // And to the operator.
 

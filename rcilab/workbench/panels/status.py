@@ -18,6 +18,7 @@ from rcilab.workbench.panels.scene_legends import scene_legends
 from rcilab.workbench.panels.scene_tools import scene_tools
 
 if TYPE_CHECKING:
+    from rcilab.app.link.page_link import LinkQuestion
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
@@ -135,12 +136,28 @@ def _seen_by_pages(lock: ControlLock, text: Text) -> dict[int, str]:
 
 
 def _question(state: UiState, text: Text) -> dict[str, Any] | None:
-    """Returns the question to the page with the controls, or None."""
-    lock = state.control_lock
+    """Returns the question to a page, or None; `kind` is that of its answer."""
+    lock, link = state.control_lock, state.link
     if lock.asking is None or lock.holder is None:
-        return None
+        return None if link is None else _link_question(link, state, text)
     asked = text("control_lock.question", page=lock.number(lock.asking), seconds=f"{PATIENCE:.0f}")
-    return {"page": lock.holder, "text": asked, "yes": text("control_lock.yes"), "no": text("control_lock.no")}
+    yes, no = text("control_lock.yes"), text("control_lock.no")
+    return {"page": lock.holder, "text": asked, "yes": yes, "no": no, "kind": "answer"}
+
+
+def _link_question(question: LinkQuestion, state: UiState, text: Text) -> dict[str, Any]:
+    link = question.link
+    parts = [text("link.ask", model=link.model)]
+    if link.model != state.model.name:
+        parts.append(text("link.ask_arm", ours=state.model.name))
+    if link.program is not None:
+        parts.append(text("link.ask_program", count=len(link.program.waypoints)))
+    if link.cell is not None:
+        parts.append(text("link.ask_cell", count=len(link.cell.obstacles)))
+    return {
+        "page": question.page, "text": " ".join(parts), "yes": text("link.yes"), "no": text("link.no"),
+        "kind": "answerlink",
+    }  # fmt: skip
 
 
 def _chip(text: Text, name: str, value: str, tone: str = "", *, wide: bool = False, hint: str = "") -> dict[str, Any]:

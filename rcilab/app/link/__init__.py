@@ -1,0 +1,1 @@
+"""Links to a view: what they contain, and how they are opened."""
