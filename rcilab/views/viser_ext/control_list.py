@@ -50,7 +50,9 @@ def _place_of(gui: Any, handle: Any) -> tuple[str, ...] | None:
     labels: list[str] = []
     while True:
         container: Any = gui._container_handle_from_uuid.get(handle._impl.parent_container_id)
-        if container is None or not hasattr(container, "_impl"):
+        if container is None:
+            return tuple(labels)
+        if not hasattr(container, "_impl"):  # A tab, or the page itself.
             return (container._label, *labels) if hasattr(container, "_label") else tuple(labels)
         if not container._impl.props.visible:
             return None
