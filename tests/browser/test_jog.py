@@ -162,7 +162,7 @@ _UP = [0, 0, 0, 0, 0xD4, 0xFE]  # x, y, z as little-endian int16: -300, away fro
 _TURNED = [*_UP[:4], 0, 0, 0, 0, 0, 0, 0x2C, 0x01]  # With the turns in the same report: 300 about z.
 
 
-def test_a_spacemouse_jogs_only_with_a_button_pressed_and_stops_with_it_and_with_its_silence(jogging):
+def test_a_spacemouse_jogs_only_with_a_button_pressed_and_stops_with_it_its_silence_and_its_cable(jogging):
     page, tab = jogging, jogging.tab
     tab.evaluate(_SPACEMOUSE)
     tab.locator("#rl-toolbar").get_by_role("button", name="SpaceMouse").click()
@@ -190,4 +190,15 @@ def test_a_spacemouse_jogs_only_with_a_button_pressed_and_stops_with_it_and_with
     require_room(page)
     now = page.state.model.forward(page.status.q_c)
     assert np.linalg.norm(now.position - before.position - travel) < 1e-4
-    tab.evaluate("fakeMouse.report(3, [0, 0])")
+    page.wait(lambda: page.status.phase == "idle", "an idle arm")
+    tab.evaluate("bytes => fakeMouse.deflect(1, bytes)", _UP)
+    page.wait(lambda: moves(page), "the tool to move again")
+    tab.evaluate(_UNPLUGGED)
+    require_rest(page)
+    tab.evaluate("clearInterval(fakeMouse.timer)")
+
+
+_UNPLUGGED = """() => {
+  const hid = Object.getOwnPropertyDescriptor(Navigator.prototype, "hid").get.call(navigator);
+  hid.dispatchEvent(Object.assign(new Event("disconnect"), { device: fakeMouse }));
+}"""

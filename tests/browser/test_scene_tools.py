@@ -61,6 +61,14 @@ def test_two_picks_measure_distance_steps_and_angle_and_the_points_follow_what_m
     assert page.tab.locator("#rl-measure").count() == 0
 
 
+def test_a_tap_of_a_finger_chooses_an_obstacle(page: BenchPage, boxed):
+    session = page.tab.context.new_cdp_session(page.tab)
+    x, y = page.project("/base_axes", tuple(boxed.pose.position))
+    session.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
+    session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    page.wait(lambda: page.state.cell.selected is not None, "the chosen box")
+
+
 def _numbers(text: str) -> list[float]:
     steps = next(line for line in text.splitlines() if line.startswith("dx"))
     return [float(number) for number in steps.split()[1::2]]

@@ -31,12 +31,14 @@ from rcilab.control_process import SupervisorStatus
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.locale import LANGUAGES
+from rcilab.i18n.units import Units
 from rcilab.model.robot_model import load_model
 from rcilab.views.null_scene import NullScene
 from rcilab.workbench.live import Here, Home, LiveChannel, PageMessage, Peek
 from rcilab.workbench.panels.branches import BranchesPanel
 from rcilab.workbench.panels.elbow import ring_html
 from rcilab.workbench.panels.scene_legends import scene_legends
+from rcilab.workbench.panels.scene_tools import scene_tools
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.panels.timeline import TimelinePanel
 from rcilab.workbench.scene.elbow_view import ElbowSceneView
@@ -353,6 +355,23 @@ def test_path_and_workspace_have_legends_and_the_workspace_can_be_cut(bench, lan
     assert bench.state.scene.cut.axis == "z"
     bench.scene.cut(CutWorkspace(axis="none", at=0.0))
     assert bench.state.scene.cut is None
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_the_tools_of_the_scene_get_texts_units_and_the_preview(bench, language):
+    tools = scene_tools(bench.state, STANDING, Text(language))
+    assert [tool["name"] for tool in tools["tools"]] == ["measure", "picture", "film", "spacemouse"]
+    assert not re.search(r"\b(tool|measure|film|spacemouse)\.[a-z]", str(tools))
+    assert tools["measure"]["length"] == {"factor": 1000.0, "unit": " mm", "digits": 1}
+    assert tools["measure"]["angles"]["unit"] == "°"
+    in_si = scene_tools(bench.state, STANDING, Text(language, Units(angle="rad", length="m")))["measure"]
+    assert in_si["length"] == {"factor": 1.0, "unit": " m", "digits": 4}
+    assert in_si["angles"] == {"factor": 1.0, "unit": " rad", "digits": 3}
+    assert tools["preview"] is None, "nothing is planned"
+    bench.aim(0.0, 0.1, 0.0)
+    assert scene_tools(bench.state, STANDING, Text(language))["preview"] == {"share": 0.0, "playing": False}
+    moving = replace(STANDING, phase="moving")
+    assert scene_tools(bench.state, moving, Text(language))["preview"] is None, "the arm moves, not the preview"
 
 
 class Drawn:
