@@ -237,6 +237,8 @@ def test_a_finger_turns_the_camera_and_moves_a_handle_only_after_a_long_press(pa
     swipe(0)
     page.wait(lambda: np.abs(np.subtract(tab.evaluate(where), before)).max() > 0.05, "the camera to turn")
     assert page.state.goal.target.is_close(target, 0.0)
+    reacting = "__viserMutable.scene.__r3f.root.getState().events.enabled"
+    page.wait(lambda: tab.evaluate(reacting), "the scene to react to a mouse again")
     tab.get_by_role("button", name="View of the whole arm").click()
     page.wait(lambda: np.abs(np.subtract(tab.evaluate(where), before)).max() < 0.01, "the camera to come back")
     swipe(700)

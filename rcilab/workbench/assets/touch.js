@@ -32,7 +32,9 @@
   }, true);
   for (const kind of ["pointerup", "pointercancel"]) {
     window.addEventListener(kind, (event) => {
-      if (!event.isTrusted || !finger || event.pointerId !== finger.pointerId) return;
+      if (!event.isTrusted || event.pointerType !== "touch") return;
+      setTimeout(() => scene.block("touch", false));  // A mouse may come next.
+      if (!finger || event.pointerId !== finger.pointerId) return;
       clearTimeout(timer);
       if (kind === "pointerup") press();  // The release follows.
       finger = null;
