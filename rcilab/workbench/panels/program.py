@@ -64,7 +64,6 @@ class ProgramPanel:
             on_press(insert, ask, lambda page: EditProgram(page=page, what="insert", type=kinds.get(chosen.value, "")))
             box = gui.add_text(text("program.find"), "", hint=text("program.find_hint"))
             self._find = NumberField(box, ask, "program.0.find")
-        self._list = Html(gui)
         with gui.add_folder(text("program.tools")):
             gui.add_html('<i class="rl-tools rl-bare"></i>')
             self._tools: dict[str, Any] = {}
@@ -72,6 +71,7 @@ class ProgramPanel:
                 button = gui.add_button(text(f"program.{what}"), icon=icon, color="gray", hint=text(f"program.{what}"))
                 on_press(button, ask, _edit(what.removesuffix("_steps")))
                 self._tools[what] = button
+        self._list = Html(gui)
         with gui.add_folder(text("program.plan_title")):
             gui.add_html('<i class="rl-buttons"></i>')
             self._plan = gui.add_button(text("program.plan"), icon="route", hint=text("program.plan_hint"))

@@ -117,7 +117,8 @@ class WaypointPanel:
         for name, field in self._fields.items():
             field.field = f"program.{key}.{name}"
             field.show(values.get(name, ""), state.problems.get(field.field), state.entered)
-        self._source.show(self._note(waypoint, frames))
+        note = f'<p class="rl-note">{esc(self._text("program.several"))}</p>' if several > 1 else ""
+        self._source.show(note + self._note(waypoint, frames))
 
     def _show_kind(self, waypoint: Waypoint) -> None:
         """Shows the type; one that has no target is the only option."""
