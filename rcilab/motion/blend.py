@@ -150,6 +150,8 @@ def _scaled(state: State, rate: float) -> State:
 
 def _tool_state(path: Path, corner: Pose, share: float) -> State:
     """Returns position, rotation vector from the corner and arm angle, (7,), with two derivatives by the share."""
+    if path.circle is None and path.turning is None:
+        return _line_state(path, share, is_end=corner is path.goal)
     T, psi = path.sample(share + DIFFERENCE_STEP * np.array([-1.0, 0.0, 1.0]))
     rows = np.zeros((3, 7))
     rows[:, :3] = T[:, :3, 3]
@@ -160,6 +162,20 @@ def _tool_state(path: Path, corner: Pose, share: float) -> State:
         if rows[row, 3:6] @ rows[1, 3:6] < 0.0 and (size := float(np.linalg.norm(rows[row, 3:6]))) > math.pi / 2.0:
             rows[row, 3:6] *= 1.0 - math.tau / size
     return central_state(*rows)
+
+
+def _line_state(path: Path, share: float, *, is_end: bool) -> State:
+    """Returns the same for a line with a slerp, whose corner is one of its ends: all of it is linear in the share."""
+    start, goal = path.start, path.goal
+    slope, value = np.zeros(7), np.zeros(7)
+    slope[:3] = goal.position - start.position
+    slope[3:6] = _rotation_vector(start.rotation.T @ goal.rotation)
+    value[:3] = start.position
+    if path.psi_start is not None and path.psi_goal is not None:
+        slope[6], value[6] = path.psi_goal - path.psi_start, path.psi_start
+    value += share * slope
+    value[3:6] = (share - 1.0 if is_end else share) * slope[3:6]
+    return value, slope, np.zeros(7)
 
 
 def _rotation_vector(R: Array) -> Array:
