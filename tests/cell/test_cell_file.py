@@ -148,6 +148,7 @@ def _archive(**entries: str) -> bytes:
             "is not in cell.zip",
         ),
     ],
+    ids=["no archive", "no cell", "no JSON", "no mesh"],  # Archives contain times, which differ between workers.
 )
 def test_a_wrong_archive_is_refused(content: bytes, said: str) -> None:
     with pytest.raises(InvalidValueError, match=said):
