@@ -21,6 +21,7 @@ _UNITS: dict[str, dict[str, float]] = {
     **{f"mm{per}": {f"mm{per}": 1.0, f"m{per}": 1000.0} for per in _RATES},
 }
 """Units accepted after a number, by the field's unit, each in the field's unit; longer names first."""
+_SHOWN = 5e-4  # Part of a bound by which what is shown of it may be rounded.
 _MAX_LENGTH = 40  # Characters; longer than any number in normal use.
 
 
@@ -70,13 +71,20 @@ def parse_number(
         return Parsed(None, message("parse.garbage", typed=shown, unit=unit))
     if not math.isfinite(value):
         return Parsed(None, message("parse.not_finite", typed=shown, unit=unit))
-    value *= _UNITS.get(unit, {}).get(suffix, 1.0)
+    value = _at_shown_end(value * _UNITS.get(unit, {}).get(suffix, 1.0), low, high)
     if (soft_low and value < low) or (soft_high and value > high):
         limit = math.radians(low if value < low else high)
         return Parsed(None, message("parse.range_soft", typed=shown, bounds=_bounds(low, high, unit), limit=limit))
     if not low <= value <= high:
         return Parsed(None, message("parse.range", typed=shown, bounds=_bounds(low, high, unit)))
     return Parsed(value)
+
+
+def _at_shown_end(value: float, low: float, high: float) -> float:
+    """Returns a number, or the bound if it is beyond it by no more than the rounding of what is shown of a bound."""
+    if low - _SHOWN * max(1.0, abs(low)) <= value < low:
+        return low
+    return high if high < value <= high + _SHOWN * max(1.0, abs(high)) else value
 
 
 def _bounds(low: float, high: float, unit: str) -> Message:

@@ -76,5 +76,5 @@ def outcome_html(outcome: Outcome, status: SupervisorStatus | None, text: Text, 
         return verdict("warn", "▲", describe_goal(run, text))
     if run is not None and len(run.q):
         largest = float(np.abs(np.nan_to_num(run.error)).max())
-        return verdict("good", "✓", text("run.arrived", cycles=len(run.t), error=largest))
+        return verdict("good", "✓", text("run.arrived", duration=run.duration, error=largest))
     return ""

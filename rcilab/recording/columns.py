@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.cycle_log import Column, cycle_columns, split_columns
 from rcilab.recording.run_file import report_facts
 
@@ -44,7 +45,7 @@ def run_facts(run: Run) -> dict[str, Any]:
         "truncated": run.truncated,
         "complete": run.is_complete,
         "faults": [fault.manual_name for fault in run.faults],
-        "delay_cycles": run.delay,
+        "delay_s": CYCLE_TIME * run.delay,
         "error_rms_rad": tracking.joint_rms.tolist(),
         "error_max_rad": tracking.joint_max.tolist(),
         "tool_error_rms_m": tracking.position_rms,

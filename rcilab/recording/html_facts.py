@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from rcilab.core.cycle_log import state_cycles
 from rcilab.core.error_base import plain_text
 from rcilab.core.fault import name_faults
 from rcilab.core.state import COMPLIANT_MODES
@@ -17,11 +18,11 @@ if TYPE_CHECKING:
 
 def fact_rows(run: Run, text: Text) -> list[list[str]]:
     """Returns the rows of the table: name and text."""
-    setup, report = run.setup, run.report
+    setup, report, period = run.setup, run.report, state_cycles(run.cycles)
     rows = [
         ("started", setup.started),
         ("target", " · ".join(part for part in (setup.target, setup.plant, setup.motion_kind) if part)),
-        ("duration", text("facts.cycles", duration=run.duration, cycles=len(run.cycles))),
+        ("duration", text("facts.cycles", duration=run.duration, cycles=len(run.cycles), period=period)),
         ("ended", _ended(run, text)),
         ("health", _health(run, text)),
         ("delay", text("facts.delay_cycles", delay=run.delay)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from rcilab.conformance.explain import explain_place
@@ -52,7 +53,12 @@ def row_word(row: ConditionResult, text: Text) -> str:
 def row_facts(row: ConditionResult, text: Text) -> list[str]:
     """Returns the worst value, where it is, and when."""
     value, bound = row.displayed
-    if row.limits is not None and row.has_share:
+    if not math.isfinite(value):
+        facts = [text("check.unknown")]
+    elif row.condition.signal == "position" and value < 0.0:
+        (number,) = text.units.format_numbers(row.unit, -value)
+        facts = [text("check.inside", value=with_unit(number, row.unit, text))]
+    elif row.limits is not None and row.has_share:
         low, high = row.limits
         numbers = text.units.format_numbers(row.unit, value, low, high, (low + high) / 2.0)
         worst, lowest, highest, middle = (with_unit(number, row.unit, text) for number in numbers)
