@@ -41,7 +41,7 @@
     return [
       line("distance", `${number(step.length(), words.length)}${words.length.unit}`),
       line("steps", `dx ${dx}  dy ${dy}  dz ${dz}`),
-      line("angle", `${words.angle} ${number(angle, words.angles)}${words.angles.unit}`),
+      line("angle", words.angle.replace("#", number(angle, words.angles) + words.angles.unit)),
       line("hint", picks.map(({ owner }) => nameOf(owner)).join(" → ")),
     ];
   };

@@ -33,8 +33,9 @@ def scene_tools(state: UiState, status: SupervisorStatus, text: Text) -> dict[st
 def _measure(state: UiState, text: Text) -> dict[str, Any]:
     cell = state.cell.cell
     return {
-        **{name: text(f"measure.{name}") for name in ("first", "second", "angle", "base", "tool", "floor")},
-        "link": text("measure.link", number="#"),
+        **{name: text(f"measure.{name}") for name in ("first", "second", "base", "tool", "floor")},
+        "link": text("measure.link", number="#"),  # The script puts in the number.
+        "angle": text("measure.angle", angle="#"),
         "obstacles": [] if cell is None else [obstacle.name for obstacle in cell.obstacles],
         "length": _unit(text, "m"),
         "angles": _unit(text, "rad"),
