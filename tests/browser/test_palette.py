@@ -47,6 +47,10 @@ def test_examples_options_switches_tabs_and_views_are_used_by_keys(page, search)
     assert search("program")[0] == "Program"
     page.tab.keyboard.press("Enter")
     page.button("Plan all").wait_for(state="visible")
+    page.open_tab("Jog")
+    assert search("import path")[0] == "Import path"
+    with page.tab.expect_file_chooser():
+        page.tab.keyboard.press("Enter")
 
 
 def test_what_is_disabled_is_not_used_and_held_buttons_are_not_listed(page, search):

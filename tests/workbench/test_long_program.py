@@ -8,10 +8,13 @@ from hypothesis import strategies as st
 
 from rcilab.app.program.edit_actions import EditProgram, ShowRows
 from rcilab.app.program.program_actions import LoadProgram
+from rcilab.app.program.program_draft import Note
 from rcilab.app.request import TypeField
+from rcilab.app.text import Text
+from rcilab.i18n.translator import Remark
 from rcilab.motion import Program, Waypoint
 from rcilab.workbench.panels.program import ProgramPanel
-from rcilab.workbench.panels.program_list import LONGEST_WINDOW, window_around
+from rcilab.workbench.panels.program_list import LONGEST_WINDOW, notes_html, window_around
 from tests.workbench.opened import opened, wait
 from tests.workbench.test_program import MODEL, PLACE
 
@@ -75,6 +78,13 @@ def test_the_page_gets_a_part_of_a_long_list_and_points_once():
         ask(TypeField(field=f"program.{keys[-1]}.speed", text="37"))
         wait(lambda: has(COUNT) and ">37<" in rows(), "the edited row, in sight again")
         assert len(rows()) < SMALL
+
+
+def test_thousands_of_notes_stay_short():
+    notes = tuple(Note(Remark("", "blend", number=key, asked=0.01, radius=0.001), key) for key in range(1, COUNT))
+    listed = notes_html(notes, Text("en"))
+    assert f"{COUNT - 1} blends shortened" in listed
+    assert len(listed) < SMALL
 
 
 def test_a_short_list_is_whole():

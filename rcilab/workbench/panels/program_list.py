@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 LONGEST_WINDOW = 120
 """Rows that the page gets of a longer program; tuning value: some screens of them, so that scrolling seldom waits."""
 _MARGIN = 30  # Rows around the wanted one that are there, too.
+_LISTED_NOTES = 100  # Further ones are at their rows.
 _NOTED = "*"
 _HEADS = ("number", "type", "place", "speed", "blend", "psi", "dwell")
 
@@ -105,7 +106,8 @@ def notes_html(notes: tuple[Note, ...], text: Text) -> str:
         return f'<p class="rl-note">{_NOTED} {_sentences(notes, text)[0]}</p>'
     codes = {note.code for note in notes}
     code = "program.shortened" if codes == {"blend"} else "program.noted"
-    listed = "".join(f"<li>{sentence}</li>" for sentence in _sentences(notes, text))
+    listed = "".join(f"<li>{sentence}</li>" for sentence in _sentences(notes, text)[:_LISTED_NOTES])
+    listed += "<li>…</li>" if len(notes) > _LISTED_NOTES else ""
     return (
         f'<details class="rl-noted"><summary>{_NOTED} {esc(text(code, count=len(notes)))}</summary>'
         f"<ul>{listed}</ul></details>"
