@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator
+from itertools import islice
 
 from rcilab.core.arrays import Unquoted
 from rcilab.core.errors import InvalidValueError
 from rcilab.i18n.translator import Remark
 from rcilab.motion.path import Point
 from rcilab.motion.path_move import ArcMove, PathMove
+from rcilab.motion.waypoint import MOST_WAYPOINTS, require_count
 
 _WORD = re.compile(r"([A-Z])([+-]?(?:\d+\.?\d*|\.\d+))")
 _PROGRAMMED = re.compile(r"[A-Z]?[#\[<]|M0*9[89](?!\d)")
@@ -35,6 +37,7 @@ _END = (2.0, 30.0)
 _SUBPROGRAM = "is a subprogram or a variable; have the CAM program write plain moves"
 _SAME_RADIUS = 1e-5, 1e-3
 """Largest difference between the radii at start and end of an arc, [m] and as a part of the radius: rounding."""
+_LARGEST = 1e9  # Number of a word; no machine has larger ones.
 _HELIX_SAGITTA = 1e-5  # [m] Tuning value: largest distance of the chords of a helix from it.
 _FULL_TURN = 1e-9  # [m] An arc that ends this close to its start is a full circle.
 _SHORTEST = 1e-9  # [m] A shorter move is none.
@@ -79,7 +82,12 @@ def _words(line: str, name: str, number: int) -> list[tuple[str, float]]:
         if match is None:
             problem = "is not a word of G-code; a word is a letter and a number, such as X1.5"
             raise InvalidValueError(where, text[at:], problem).coded("gcode_word")
-        words.append((match[1], float(match[2])))
+        value = float(match[2])
+        if abs(value) > _LARGEST:
+            raise InvalidValueError(where, match[0], f"has a number beyond {_LARGEST:g}").coded(
+                "gcode_large", most=f"{_LARGEST:g}"
+            )
+        words.append((match[1], value))
         at = match.end()
     return words
 
@@ -215,9 +223,11 @@ class _Reader:
         feed = None if self._motion == "rapid" else self._feed
         if is_arc:
             assert start is not None
-            self.moves += self._arc(line, start, goal, given, feed)
+            self.moves += islice(self._arc(line, start, goal, given, feed), MOST_WAYPOINTS + 1)
         elif not self.moves or start is None or math.dist(start, goal) > _SHORTEST:
             self.moves.append(PathMove(line=line, position=goal, feed=feed))
+        if len(self.moves) > MOST_WAYPOINTS:  # Before a large file fills the memory.
+            require_count(len(self.moves))
 
     def _arc(
         self, line: int, start: Point, goal: Point, given: dict[str, float], feed: float | None
@@ -245,7 +255,7 @@ class _Reader:
             return place[0], place[1], place[2]
 
         if abs(rise) > _SHORTEST:  # No waypoint is a helix.
-            step = 2.0 * math.acos(max(1.0 - _HELIX_SAGITTA / radius, 0.0))
+            step = min(2.0 * math.sqrt(2.0 * _HELIX_SAGITTA / radius), 0.5 * math.pi)
             count = max(math.ceil(abs(angle) / step), 1)
             yield from (PathMove(line=line, position=point(i / count), feed=feed) for i in range(1, count))
             yield PathMove(line=line, position=goal, feed=feed)
@@ -271,7 +281,7 @@ class _Reader:
                     "gcode_center"
                 )
             return self._by_radius(a, b, given["R"] * self._unit, sign)
-        if offsets == [None, None]:
+        if offsets == [None, None] or (self._has_absolute_centers and None in offsets):
             problem = "is an arc without centre; give I, J, K or R in the plane that is chosen (G17, G18, G19)"
             raise self._error("G2" if sign < 0.0 else "G3", problem).coded("gcode_no_center")
         shift = [0.0 if offset is None else offset * self._unit for offset in offsets]

@@ -12,7 +12,7 @@ from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
 from rcilab.core.spatial import Pose
 from rcilab.motion.path_move import PathMove
 from rcilab.motion.table import Table, read_table
-from rcilab.motion.waypoint import MAX_COORDINATE
+from rcilab.motion.waypoint import MAX_COORDINATE, require_count
 
 _POSITION = re.compile(r"(?:\w*[_. ])?([xyz])[ _]*[\[(]?(um|mm|cm|m|in)?[\])]?")
 _QUATERNION = re.compile(r"q[_ ]?([wxyz])")
@@ -30,6 +30,7 @@ def read_path_table(content: bytes, name: str) -> list[PathMove]:
         InvalidValueError: The table is not valid; the message names file, line, value and remedy.
     """
     table = read_table(content, name, DEFAULT_MAX_ROWS)
+    require_count(len(table.lines))
     positions, wxyz, feeds, shares = _columns(table, name)
     return [
         PathMove(

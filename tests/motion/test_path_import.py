@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 import re
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from rcilab.conformance.check import check
 from rcilab.core.errors import InvalidValueError
@@ -136,6 +139,31 @@ def test_what_would_change_the_path_unseen_is_refused_with_its_line_in_both_lang
     shown = Text("zh", "rcilab.app").render(describe_error(caught.value))
     assert "part.nc" in shown
     assert re.search("[\u4e00-\u9fff]", shown)
+
+
+_WORDS = st.builds(
+    lambda letter, number, digits: f"{letter}{number:.{digits}f}",
+    st.sampled_from("GGGXYZIJKRFPMNSE"),
+    st.one_of(st.sampled_from((0.0, 1.0, 2.0, 3.0, 17.0, 18.0, 20.0, 90.1, 91.0)), st.floats(-1e10, 1e10)),
+    st.integers(0, 3),
+)
+_LINES = st.lists(st.lists(_WORDS, max_size=6).map(" ".join), max_size=12).map("\n".join)
+
+
+@settings(max_examples=300)
+@given(st.one_of(_LINES, st.text(), st.binary().map(lambda content: content.decode("latin-1"))))
+def test_any_file_is_a_path_or_refused(text):
+    with suppress(InvalidValueError):
+        assert gcode(START + text)
+    with suppress(InvalidValueError):
+        assert table(text)
+
+
+def test_a_helix_without_end_and_a_file_without_end_are_refused():
+    with pytest.raises(InvalidValueError, match="1 to 10000"):
+        gcode(START + "G2 X500 Y0 Z301 I999000000")
+    with pytest.raises(InvalidValueError, match="1 to 10000"):
+        gcode("".join(f"G1 X{number % 100} Y0 Z0\n" for number in range(200_000)))
 
 
 @pytest.mark.parametrize("text", ["G91 G0 X1 Y1 Z1", "G0 X1 Y1\nG2 X2 Y2 Z2 R2", "X1 Y2 Z3", "", "M30"])
