@@ -12,11 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcilab.core.arrays import Array, JointVector
+from rcilab.core.arrays import Array, JointVector, Matrix
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.limits import JointLimits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose, rotation_between
 from rcilab.model.dynamics.rigid_body import ToolTerms
+from rcilab.model.dynamics.symmetric_solver import SymmetricSolver
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.compliance import design_damping
 from rcilab.sim.plant import Measurement
@@ -79,7 +81,9 @@ def guide_torque(
         hold = limits.torque[_ELBOW] / STOP_ZONE
         stiffness[_ELBOW, _ELBOW] += hold
         spring[_ELBOW] += hold * (q3_held - measured.q[_ELBOW])
-    spring = spring - damping * JOINT_DAMPING * model.limits.joint.torque * measured.dq
+    spring = spring + _joint_damping(
+        terms.mass_inverse, damping * JOINT_DAMPING * model.limits.joint.torque, measured.dq
+    )
     coriolis = model.rigid_body.motion_torque(measured.q, measured.dq, np.zeros(model.n))
     return (
         design_damping(terms.mass_inverse, stiffness, damping * GUIDE_DAMPING).torque(spring, -measured.dq) + coriolis
@@ -124,6 +128,15 @@ def _held(
     if about:
         error = np.array((0.0, 0.0, 0.0, *rotation_between(terms.pose.parts[0], T_held.parts[0])))
         yield about, cartesian.rotation_stiffness, error[about]
+
+
+def _joint_damping(mass_inverse: Matrix, dampers: JointVector, dq: JointVector) -> JointVector:
+    """Returns the torque of viscous dampers at the joints, shape (n,), [N m].
+
+    It is that of the velocities at the end of the cycle, tau = -D (dq + h M^-1 tau), which damps any inertia. With the
+    measured velocities, dampers of more than 2 M / h would accelerate a light last link.
+    """
+    return SymmetricSolver(len(dq)).solve(np.diag(1.0 / dampers) + CYCLE_TIME * mass_inverse, -dq)
 
 
 def _limit_springs(q: JointVector, limits: JointLimits) -> tuple[Array, JointVector]:

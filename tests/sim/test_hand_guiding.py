@@ -60,6 +60,18 @@ def test_a_guided_arm_is_weightless_compliant_and_stops(make: Maker, model: Robo
     assert np.abs(run(plant, law, 4000, led).dq).max() < 0.005
 
 
+@pytest.mark.parametrize("name", ["xArm5", "xArm6", "xArm7", "Lite6", "850"])
+def test_a_light_last_link_follows_a_weak_push_slowly(name: str) -> None:
+    model, fastest = load_model(name), 0.0
+    plant, T = IdealPlant(model), model.forward(model.home)
+    measured = plant.reset(model.home)
+    plant.push([0.5, 0.5, 0.0, 0.0, 0.0, 0.0])
+    for _ in range(200):  # With the largest damping that a controller sets.
+        measured = plant.step(idle(measured, guide_torque(model, measured, FREE, T, damping=2.56)))
+        fastest = max(fastest, float(np.abs(measured.dq).max()))
+    assert 0.01 < fastest < 0.3
+
+
 @both
 def test_translation_leaves_the_orientation(make: Maker, model: RobotModel) -> None:
     plant, T = make(model), model.forward(model.home)

@@ -28,6 +28,12 @@ class Signals:
     input_functions: list[int] = field(default_factory=lambda: [0] * BOX_SIGNALS)
     output_functions: list[int] = field(default_factory=lambda: [0] * BOX_SIGNALS)
 
+    def set_loop_back(self, on: bool) -> None:
+        """Wires every output to the input of the same number, with its present level, or none."""
+        self.loop_back = on
+        if on:
+            self.inputs, self.analog_inputs = self.outputs, self.analog_outputs.copy()
+
     def set_input(self, signal: int, level: bool) -> None:
         """Sets the level of a digital input.
 

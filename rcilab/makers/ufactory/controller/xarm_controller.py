@@ -196,7 +196,7 @@ class XArmController:
 
     @loop_back.setter
     def loop_back(self, on: bool) -> None:
-        self.signals.loop_back = on
+        self.signals.set_loop_back(on)
 
     @property
     def state(self) -> RobotState:

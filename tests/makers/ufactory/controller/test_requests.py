@@ -251,6 +251,15 @@ def test_outputs_are_set_and_wired_back(arm: Arm) -> None:
     assert arm.call(Function.TOOL_READ_16, ">BH", 9, 0x0A14)[1] == struct.pack(">i", 2)
 
 
+def test_a_wire_carries_the_level_that_its_output_already_has(arm: Arm) -> None:
+    arm.call(Function.SET_OUTPUTS, ">HB", 0x0101, 1)
+    arm.call(Function.SET_ANALOG_2, ">HB", 2048, 1)
+    assert arm.controller.inputs == ()
+    arm.controller.loop_back = True
+    assert arm.controller.inputs == (0,)
+    assert arm.call(Function.GET_ANALOG_2)[1] == struct.pack(">H", 2048)
+
+
 def test_an_output_waits_for_the_motions_before_it_or_not(arm: Arm) -> None:
     arm.call(Function.SET_FEEDBACK, "B", 4)
     arm.move_joints((Q6[0] + 0.1, *Q6[1:]))
