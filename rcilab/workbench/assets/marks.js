@@ -6,7 +6,7 @@
   "use strict";
   // .rl-NAME, an element of ours: "NAME" is the box around the one it is in, as viser wraps every control; "in-NAME" that.
   const NAMES = new Set(["across", "anyone", "axes", "bare", "buttons", "choices", "elbow", "exports", "held", "jogset", "joints",
-    "pairs", "poses", "ring", "rows", "setup-head", "signals", "strip", "tools", "trios", "triples", "under", "wall", "worded"]);
+    "pairs", "poses", "ring", "rows", "setup-head", "signals", "strip", "tools", "trios", "triples", "under", "wall", "wide", "worded"]);
   const MARKERS = [...NAMES].map((name) => ".rl-" + name).join();
   const MANY = 7;  // Tabs: the main panel has eight, the others one or two.
   let root = null, marked = new Map();

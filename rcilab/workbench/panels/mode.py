@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.app.arm_features import explain_missing_feature, explain_missing_part, is_only_planned
 from rcilab.app.run.drive_state import is_pending
 from rcilab.app.run.mode_actions import PressControl, SetDrive
-from rcilab.app.run.mode_parameters import held_rows, name_group, name_parameter, shown_numbers, typed_scale
+from rcilab.app.run.mode_parameters import held_rows, is_mixed, name_group, name_parameter, shown_numbers, typed_scale
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.text import Text
 from rcilab.core.state import MODES, Mode
@@ -62,7 +62,8 @@ class ModePanel:
             visible = state.drive.mode in group.modes
             folder = gui.add_folder(name_group(text, group), visible=visible, expand_by_default=group.is_first)
             with folder:
-                gui.add_html('<i class="rl-pairs"></i>')
+                wide = " rl-wide" if is_mixed(group) else ""  # Names with ranges and units need a whole row.
+                gui.add_html(f'<i class="rl-pairs{wide}"></i>')
                 names = [text.render(parameter.label) for parameter in group.parameters]
                 shown = [name_parameter(text, group, index) for index in range(len(names))]
                 fields = [self._build_field(gui, group, index, label) for index, label in enumerate(shown)]

@@ -36,6 +36,7 @@ class SoftLimitsPanel:
         self._fields: list[tuple[str, int, NumberField]] = []
         self._named: list[tuple[str, str]] = []
         with gui.add_folder(text("softlimits.title"), expand_by_default=False):
+            self._problems = Html(gui)  # Above the fields: fourteen of them hide what is below.
             gui.add_html('<i class="rl-pairs"></i>')
             for joint in range(state.model.n):
                 for end in JOINT_ENDS:
@@ -43,7 +44,6 @@ class SoftLimitsPanel:
                     box = gui.add_text(label, "", hint=text("softlimits.hint"))
                     self._fields.append((end, joint, NumberField(box, ask, field, text.unit("deg"))))
                     self._named.append((field, label))
-            self._problems = Html(gui)
             self._whole = gui.add_button(text("softlimits.whole"), icon="restore", color="gray")
             on_press(self._whole, ask, lambda page: PressSetup(page=page, what="whole"))
         self._has_auto = "auto_limit" in capabilities_of(state.model).options
