@@ -29,7 +29,7 @@ def test_it_is_planned_for_checked_and_executed_and_keeps_the_limits_that_are_se
     page.open_tab("Setup")
     table = page.tab.locator("table.rl-setup:visible")
     page.wait(lambda: "Tool frame" in table.inner_text(), "the parts of this arm")
-    for shown in ("Payload of the tool frame", "Joint ranges", "Largest speeds of the joints", "Collision stage"):
+    for shown in ("Payload of the tool frame", "Joint ranges", "Joint speeds", "Collision stage"):
         assert shown in table.inner_text()
     page.bench.dispatcher.ask(SetControl(group="joint_velocity", index=0, value=0.5))
     page.wait(lambda: page.state.model.limits.joint.velocity[0] == 0.5, "the limit of the plans")
