@@ -7,6 +7,7 @@ import threading
 import time
 
 import numpy as np
+import pytest
 
 from browser.page import BenchPage, close_toasts
 from rcilab.app.text import Text
@@ -208,6 +209,45 @@ def test_a_page_of_a_foreign_origin_gets_no_websocket(page, chromium):
         context.close()
         server.shutdown()
     assert answers == ["refused", "refused"]
+
+
+_FILL = """(said) => {
+  for (const [id, text] of Object.entries(said)) document.querySelector(`.rl-chip[data-id=${id}] b`).textContent = text;
+  const bar = document.querySelector("#rl-chips").getBoundingClientRect();
+  return [...document.querySelectorAll(".rl-chip")].map((chip) => {
+    const box = chip.getBoundingClientRect(), text = chip.lastChild;
+    const isSeen = box.top < bar.bottom - 1 && box.right <= bar.right + 0.5;
+    return [chip.dataset.id, isSeen && text.scrollWidth <= text.clientWidth];
+  });
+}"""
+"""Puts long texts into the bar; returns which of its entries are seen whole, as the bar is then."""
+
+
+@pytest.mark.parametrize("width", [960, 1280])
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"phase": "stopped by a fault", "faults": "joint_velocity_violation", "where": "192.168.100.160:8080 " * 2},
+        {
+            "phase": "虚拟控制器意外停止运行",
+            "faults": "关节位置限制违反",
+            "where": "虚拟控制器，刚体动力学（MuJoCo）" * 2,
+        },
+    ],
+    ids=["en", "zh"],
+)
+def test_state_faults_and_stop_are_seen_whole_beside_long_texts(page, width, said):
+    size = page.tab.viewport_size
+    page.tab.set_viewport_size({"width": width, "height": 620})
+    try:
+        seen = dict(page.tab.evaluate(_FILL, {**said, "controls": "page 1; this is page 2", "mode": "joint_position"}))
+        right = page.tab.evaluate("document.querySelector('#rl-stop').getBoundingClientRect().right")
+    finally:
+        page.tab.set_viewport_size(size)
+    assert seen["phase"]
+    assert seen["faults"]
+    assert not seen["success"], "what matters least is left out"
+    assert right <= width
 
 
 def choose(page: BenchPage, label: str, option: str) -> None:

@@ -240,6 +240,18 @@ def test_the_share_of_commands_in_time_is_that_of_a_motion_and_marked_as_past_af
     assert Text("en").render(describe_success(rested)) == "—", "no motion yet"
 
 
+def test_the_bar_has_host_and_port_of_an_address_with_all_of_it_in_the_hint():
+    address = "realman://127.0.0.2:8080?udp_port=42873"
+    state = replace(initial_state(), watched=address, target=address)
+    for language in ("en", "zh"):
+        chips = {chip["id"]: chip for chip in status_values(state, status(), Text(language), 1.0)["chips"]}
+        assert list(chips)[:2] == ["phase", "faults"], "what must not be left out comes first"
+        assert chips["where"]["value"] == "127.0.0.2:8080"
+        assert chips["where"]["hint"].endswith(address)
+    chips = {chip["id"]: chip["value"] for chip in status_values(initial_state(), status(), Text("en"), 1.0)["chips"]}
+    assert chips["where"] == "virtual controller, ideal arm"
+
+
 def initial_state():
     from rcilab.app.goal.goal import goal_at
     from rcilab.app.store import UiState

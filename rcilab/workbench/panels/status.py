@@ -83,8 +83,13 @@ def _take_label(state: UiState, text: Text) -> str:
     return text("control_lock.take" if state.control_lock.holder is None else "control_lock.ask")
 
 
-def _target_name(state: UiState, text: Text) -> str:
-    return text(f"where.{state.plant}") if state.target == "virtual" else state.target
+def _target_chip(state: UiState, status: SupervisorStatus, text: Text) -> dict[str, Any]:
+    """Returns the destination; of an address host and port only, with all of it in the hint."""
+    where = destination(state, status)
+    if where == "address":
+        host = state.target.partition("://")[2].partition("?")[0]
+        return _chip(text, "where", host, hint=f"{text('bar.where')}: {state.target}")
+    return _chip(text, "where", text("destination.preview" if where == "preview" else f"where.{where}"))
 
 
 def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[str, Any]]:
@@ -93,10 +98,8 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
     mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
     faults = text("bar.none") if not status.faults else name_faults(status.faults)
     connected = status.rate_hz > 0.0
-    lock, where = state.control_lock, destination(state, status)
-    return [
-        _chip(text, "model", state.model.name),
-        _chip(text, "where", text("destination.preview") if where == "preview" else _target_name(state, text)),
+    lock = state.control_lock
+    return [  # The last ones are left out where the bar is too short.
         _chip(
             text,
             "phase",
@@ -104,13 +107,15 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
             "warn" if status.is_pressed else _TONES.get(status.code, _TONES.get(status.phase, "bad")),
             hint=text.render(describe_status(status)),
         ),
-        _chip(text, "mode", mode),
-        _chip(text, "rate", f"{status.rate_hz:.0f} Hz" if connected else "—"),
-        _chip(text, "success", f"{100.0 * status.success_rate:.0f} %" if is_moving(status) else "—"),
+        _chip(text, "faults", faults, "bad" if status.faults else ""),
+        _chip(text, "model", state.model.name),
+        _target_chip(state, status, text),
         _chip(text, "controls", text("bar.its_client"))
         if state.watched
         else {**_chip(text, "controls", _holder(lock, text)), "of": _seen_by_pages(lock, text)},
-        _chip(text, "faults", faults, "bad" if status.faults else "", wide=True),
+        _chip(text, "mode", mode),
+        _chip(text, "rate", f"{status.rate_hz:.0f} Hz" if connected else "—"),
+        _chip(text, "success", f"{100.0 * status.success_rate:.0f} %" if is_moving(status) else "—"),
     ]
 
 
@@ -160,12 +165,10 @@ def _link_question(question: LinkQuestion, state: UiState, text: Text) -> dict[s
     }  # fmt: skip
 
 
-def _chip(text: Text, name: str, value: str, tone: str = "", *, wide: bool = False, hint: str = "") -> dict[str, Any]:
+def _chip(text: Text, name: str, value: str, tone: str = "", *, hint: str = "") -> dict[str, Any]:
     chip: dict[str, Any] = {"id": name, "label": text(f"bar.{name}"), "value": value}
     if tone:
         chip["tone"] = tone
-    if wide:
-        chip["wide"] = True
     if hint:
         chip["hint"] = hint
     return chip
