@@ -18,7 +18,7 @@ from rcilab.conformance.common_conditions import JOINT_VELOCITY
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.errors import UsageError
 from rcilab.core.fault import FaultCode
-from rcilab.core.limits import Limits
+from rcilab.core.limits import JointLimits, Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
@@ -45,6 +45,7 @@ from rcilab.makers.ufactory.controller.settings import Settings, apply_setup
 from rcilab.makers.ufactory.controller.signals import Signals
 from rcilab.makers.ufactory.errors import UfactoryError, UfactoryWarning
 from rcilab.model.robot_model import RobotModel
+from rcilab.motion.bounds import range_from
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.api import SafetyButton
 from rcilab.sim.arm_setup import ArmSetup, require_stand
@@ -167,6 +168,7 @@ class XArmController:
         self._all = (1 << arm.model.n) - 1
         arm.set_prefill(0)
         arm.configure(self.settings)
+        self._planned = self.motion_limits.joint  # Those that the planner keeps.
         self.planner = Planner(arm.model, self.motion_limits, arm.commanded.q, slows_down=False)
         self._feed = PlannerFeed(arm, self.planner, self._checked_limits)
         self.end = QueueEnd(arm.model, arm.commanded.q)
@@ -312,10 +314,22 @@ class XArmController:
         self._is_outdated = False
         self.arm.configure(self.settings)
         self._feed.abort()
-        self.planner.configure(self.model, self.motion_limits)
+        self._configure_planner(self.motion_limits.joint)
         self._feed.limits = self._checked_limits
         self.end = QueueEnd(self.model, self.planner.q)
         self._motion_watch.configure()
+
+    def _widen_ranges(self) -> None:
+        """Lets a joint that stands outside its range move inwards, before the first motion."""
+        if self.is_moving or self.planner.queued:
+            return
+        joint, planned = range_from(self.motion_limits.joint, np.array(self.planner.q)), self._planned
+        if not (np.array_equal(joint.lower, planned.lower) and np.array_equal(joint.upper, planned.upper)):
+            self._configure_planner(joint)
+
+    def _configure_planner(self, joint: JointLimits) -> None:
+        self._planned = joint
+        self.planner.configure(self.model, replace(self.motion_limits, joint=joint))
 
     def reset_state(self) -> None:
         """Sets the state after a change of mode or settings: nothing moves until it is set to 0."""
@@ -409,6 +423,7 @@ class XArmController:
         Raises:
             InvalidValueError: A value of it is not valid.
         """
+        self._widen_ranges()
         self.planner.add(target)
 
     def queue_marker(self, task: int) -> None:
@@ -428,6 +443,7 @@ class XArmController:
         Raises:
             InvalidValueError: A value is not valid.
         """
+        self._widen_ranges()
         refusal = begin(self.planner)
         self._end_online(EventKind.DISCARDED)
         self._online = task

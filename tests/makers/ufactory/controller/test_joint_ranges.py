@@ -93,3 +93,36 @@ def test_a_line_of_mode_7_on_which_a_joint_is_outside_for_a_moment(arm: Arm) -> 
     assert farthest(arm, lower, upper) < 1e-5
     assert arm.controller.error == 23
     assert np.abs(np.subtract(arm.q, start)).max() > 0.05
+
+
+@pytest.mark.parametrize("mode", [Mode.POSITION, Mode.SERVO, Mode.JOINT_ONLINE])
+def test_a_joint_that_stands_outside_its_range_may_move_back_inside(arm: Arm, mode: Mode) -> None:
+    lower, upper = Q6 - np.full(6, HALF), Q6 + np.full(6, HALF)
+    upper[4] = Q6[4] - 0.1
+    narrowed(arm, mode, lower, upper)
+
+    def move(angle: float) -> None:
+        q = (*Q6[:4], angle, Q6[5])
+        if mode is Mode.SERVO:
+            arm.call(Function.SERVO_JOINT, "10f", *q, *NOTHING)
+        else:
+            arm.move_joints(q)
+        arm.run()
+
+    for inwards in (0.0, -0.05, -0.12):  # Where it stands, on the way, and inside.
+        move(Q6[4] + inwards)
+        assert arm.controller.error is None
+        assert arm.q[4] == pytest.approx(Q6[4] + inwards, abs=1e-6)
+    move(Q6[4])  # No longer allowed.
+    assert arm.controller.error == 23
+    assert arm.q[4] == pytest.approx(Q6[4] - 0.12, abs=1e-6)
+
+
+def test_a_joint_that_stands_outside_its_range_moves_no_farther_out(arm: Arm) -> None:
+    lower, upper = Q6 - np.full(6, HALF), Q6 + np.full(6, HALF)
+    upper[4] = Q6[4] - 0.1
+    narrowed(arm, Mode.POSITION, lower, upper)
+    arm.move_joints((*Q6[:4], Q6[4] + 0.01, Q6[5]))
+    arm.run()
+    assert arm.controller.error == 23
+    assert arm.q == pytest.approx(Q6, abs=1e-6)
