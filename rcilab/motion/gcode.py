@@ -16,7 +16,8 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.i18n.translator import Remark
 from rcilab.motion.path import Point
 from rcilab.motion.path_move import ArcMove, PathMove
-from rcilab.motion.waypoint import MOST_WAYPOINTS, require_count
+from rcilab.motion.waypoint import require_count
+from rcilab.motion.waypoint_types import MOST_WAYPOINTS
 
 _WORD = re.compile(r"([A-Z])([+-]?(?:\d+\.?\d*|\.\d+))")
 _PROGRAMMED = re.compile(r"[A-Z]?[#\[<]|M0*9[89](?!\d)")

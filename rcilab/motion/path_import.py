@@ -23,7 +23,8 @@ from rcilab.motion.located_json import require_length
 from rcilab.motion.path import Point
 from rcilab.motion.path_move import PathMove
 from rcilab.motion.path_table import read_path_table
-from rcilab.motion.waypoint import LARGEST_BLEND, Floats, Waypoint, require_count, vector_of
+from rcilab.motion.waypoint import Waypoint, require_count, vector_of
+from rcilab.motion.waypoint_types import LARGEST_BLEND, Floats
 
 GCODE_SUFFIXES = (".nc", ".gcode", ".ngc", ".tap")
 PATH_SUFFIXES = (".csv", *GCODE_SUFFIXES)

@@ -12,7 +12,8 @@ from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
 from rcilab.core.spatial import Pose
 from rcilab.motion.path_move import PathMove
 from rcilab.motion.table import Table, read_table
-from rcilab.motion.waypoint import MAX_COORDINATE, require_count
+from rcilab.motion.waypoint import require_count
+from rcilab.motion.waypoint_types import MAX_COORDINATE
 
 _POSITION = re.compile(r"(?:\w*[_. ])?([xyz])[ _]*[\[(]?(um|mm|cm|m|in)?[\])]?")
 _QUATERNION = re.compile(r"q[_ ]?([wxyz])")

@@ -31,7 +31,8 @@ from rcilab.motion.segment import Segment, build_segments, naming
 from rcilab.motion.segment_spline import build_segment_spline
 from rcilab.motion.segment_spline_motion import plan_segment_spline
 from rcilab.motion.torque_rate import plan_within_torque_rate
-from rcilab.motion.waypoint import MOST_WAYPOINTS, label, named_value
+from rcilab.motion.waypoint import label, named_value
+from rcilab.motion.waypoint_types import MOST_WAYPOINTS
 
 FreePlanner: TypeAlias = Callable[..., Motion]
 """`(model, start, goal, *, speed, law) -> motion` from one stationary position to another."""

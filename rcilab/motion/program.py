@@ -23,7 +23,8 @@ from rcilab.model.dynamics.payload import Payload
 from rcilab.motion.joint import DEFAULT_SPEED
 from rcilab.motion.path_import import TOOL_DOWN, load_path
 from rcilab.motion.program_file import load_program, program_text, read_program, save_program
-from rcilab.motion.waypoint import Floats, Waypoint, angles_of, named_value, require_count, require_fit, vector_of
+from rcilab.motion.waypoint import Waypoint, angles_of, named_value, require_count, require_fit, vector_of
+from rcilab.motion.waypoint_types import Floats
 from rcilab.robots import describe_robot
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from rcilab.core.errors import InvalidValueError
 from rcilab.motion.motion_event import EventKind
-from rcilab.motion.waypoint import BLOCKS, MOST_WAYPOINTS, Waypoint, named_value
+from rcilab.motion.waypoint import Waypoint, named_value
+from rcilab.motion.waypoint_types import BLOCKS, MOST_WAYPOINTS
 
 STANDSTILL = 0.01
 """Time at standstill around an instruction that waits for an input, [s]: its row and those before it are alike."""

@@ -23,7 +23,8 @@ from rcilab.motion.json_fields import (
     read_vector,
 )
 from rcilab.motion.located_json import LongListError, Node, read_json, require_length
-from rcilab.motion.waypoint import ALLOWED, CHOICES, COMMON_FIELDS, MOST_WAYPOINTS, Waypoint, require_count, require_fit
+from rcilab.motion.waypoint import Waypoint, require_count, require_fit
+from rcilab.motion.waypoint_types import ALLOWED, CHOICES, COMMON_FIELDS, MOST_WAYPOINTS
 from rcilab.robots import RobotDescription, describe_robot
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,86 +15,28 @@ from rcilab.core.spatial import Pose, as_pose, is_transform
 from rcilab.model.kinematics.solvers.build import build_solver
 from rcilab.motion.joint import DEFAULT_SPEED, MIN_SPEED
 from rcilab.motion.path import CircleOrientation, ElbowDirection
+from rcilab.motion.waypoint_types import (
+    ALLOWED,
+    CHOICES,
+    COMMON_FIELDS,
+    DEFAULT_TIMEOUT,
+    INSTRUCTIONS,
+    LARGEST_BLEND,
+    LARGEST_OFFSET,
+    LAST_SIGNAL,
+    LONGEST_DWELL,
+    LONGEST_TEXT,
+    MAX_COORDINATE,
+    MOST_REPEATS,
+    MOST_WAYPOINTS,
+    REQUIRED,
+    Floats,
+    WaypointType,
+)
 from rcilab.robots.description import RobotDescription
 
-WaypointType: TypeAlias = Literal[
-    "joint", "line", "arc", "circle", "nullspace", "free", "retreat",
-    "wait", "input", "output", "tool", "repeat", "group", "end", "comment",
-]  # fmt: skip
-
-MAX_COORDINATE = 10.0
-"""Largest coordinate, [m]: far beyond the reach of an arm; a larger one is probably in millimetres."""
-LARGEST_BLEND = 1.0
-"""Largest blend radius, [m]: about the reach of an arm."""
-LARGEST_OFFSET = 1.0
-"""Largest distance of an approach or a retreat, [m]."""
-LONGEST_DWELL = 3600.0
-"""Longest dwell at a waypoint, [s]."""
 _UNIT_TOLERANCE = 1e-3
 """Largest difference of a quaternion's length from 1; it is normalised."""
-
-LONGEST_TEXT = 200
-"""Longest comment or name of a group, [characters]."""
-MOST_REPEATS = 1000
-"""Largest number of repetitions."""
-DEFAULT_TIMEOUT = 10.0
-"""Default time to wait for an input, [s]."""
-
-COMMON_FIELDS = ("speed", "blend", "dwell")
-"""Fields with a default; those of every motion."""
-_TARGET = ("q", "position", "wxyz", "frame", "psi")
-ALLOWED: dict[WaypointType, tuple[str, ...]] = {
-    "joint": (*_TARGET, "approach", *COMMON_FIELDS),
-    "line": (*_TARGET, "approach", *COMMON_FIELDS),
-    "arc": ("via", "via_wxyz", *_TARGET, *COMMON_FIELDS),
-    "circle": ("center", "axis", "frame", "angle", "orientation", "psi", *COMMON_FIELDS),
-    "nullspace": ("psi", "way", *COMMON_FIELDS),
-    "free": (*_TARGET, "approach", *COMMON_FIELDS),
-    "retreat": ("distance", *COMMON_FIELDS),
-    "wait": ("dwell",),
-    "input": ("signal", "level", "timeout"),
-    "output": ("signal", "level"),
-    "tool": ("jaws", "signal", "dwell"),
-    "repeat": ("count", "signal", "level", "text"),
-    "group": ("text",),
-    "end": (),
-    "comment": ("text",),
-}
-"""Fields of a waypoint by type."""
-INSTRUCTIONS: tuple[WaypointType, ...] = ("wait", "input", "output", "tool", "repeat", "group", "end", "comment")
-"""Types of steps at which nothing moves."""
-BLOCKS: tuple[WaypointType, ...] = ("repeat", "group")
-"""Types that begin a block, which "end" ends."""
-REQUIRED: dict[WaypointType, tuple[str, ...]] = {
-    "joint": (),
-    "line": (),
-    "arc": ("via",),
-    "circle": ("center", "axis"),
-    "nullspace": ("psi",),
-    "free": (),
-    "retreat": ("distance",),
-    "wait": (),
-    "input": ("signal",),
-    "output": ("signal",),
-    "tool": (),
-    "repeat": ("count",),
-    "group": (),
-    "end": (),
-    "comment": ("text",),
-}
-"""Required fields in addition to a target; the target of joint, line, arc and free is q, or position and wxyz."""
-
-CHOICES: dict[str, tuple[str, ...]] = {
-    "orientation": get_args(CircleOrientation),
-    "way": get_args(ElbowDirection),
-    "jaws": ("close", "open"),
-}
-"""Values of the fields that have a fixed set of them; the first is the default."""
-
-Floats: TypeAlias = tuple[float, ...]
-
-MOST_WAYPOINTS = 10_000
-"""Largest number of waypoints; a motion through them takes a gigabyte."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -475,8 +417,6 @@ def _require_signal(signal: object) -> int | str:
     return int(number)
 
 
-LAST_SIGNAL = 1023
-"""Largest number of a signal."""
 _DEFAULTS: dict[str, object] = {
     **{name: known[0] for name, known in CHOICES.items()}, "level": True, "timeout": DEFAULT_TIMEOUT
 }  # fmt: skip

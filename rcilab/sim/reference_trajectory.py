@@ -15,7 +15,7 @@ from rcilab.motion.differences import derivatives_from_differences, differences_
 from rcilab.motion.stop import plan_stop
 
 STEADY = (
-    0.01  # [rad/s^2] Below it a commanded velocity is constant: far above rounding, far below a motion's. A choice.
+    0.01  # [rad/s^2] Below it a commanded velocity is constant: far above rounding, far below a motion's. Tuning value.
 )
 RESTING = 1e-5  # [rad/s] Of a compliant arm that settles after commands of single precision, about 1e-6.
 JOIN_SHARE = 2.0  # Upper bound for the start of a stop, in units of the arm's limits; a tuning value.

@@ -22,7 +22,7 @@ from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchErr
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint, located_json, plan_program
-from rcilab.motion.waypoint import ALLOWED, CHOICES
+from rcilab.motion.waypoint_types import ALLOWED, CHOICES
 
 MODEL = load_model("xMatePro7")
 HOME = MODEL.forward(MODEL.home)

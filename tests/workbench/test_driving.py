@@ -133,9 +133,7 @@ def test_speeds_are_shown_and_typed_in_the_units_of_the_page():
     groups, text = parameters_of(load_model("RM75")), Text("en", maker="realman")
     speeds = find_group(groups, "joint_velocity")
     assert name_group(text, speeds) == "Joint speeds [0.5…180, 225 °/s]"
-    assert (
-        name_group(Text("en", SI, "realman"), speeds) == "Joint speeds [0.0087266…3.1416, 3.927 rad/s]"
-    )
+    assert name_group(Text("en", SI, "realman"), speeds) == "Joint speeds [0.0087266…3.1416, 3.927 rad/s]"
     assert (typed_range(speeds.parameters[0]), typed_scale(speeds.parameters[0])[1]) == ((0.5, 180.0), "°/s")
     assert typed_value(speeds.parameters[0], 180.0) == speeds.parameters[0].high
 

@@ -21,7 +21,8 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.i18n.number_parsing import parse_number
 from rcilab.i18n.translator import Message, message
-from rcilab.motion.waypoint import ALLOWED, CHOICES, Waypoint
+from rcilab.motion.waypoint import Waypoint
+from rcilab.motion.waypoint_types import ALLOWED, CHOICES
 
 LONGEST_NAME = 80
 COMMON = ("speed", "blend", "dwell", "approach", "timeout")

@@ -23,7 +23,8 @@ from rcilab.i18n.number_parsing import parse_number
 from rcilab.i18n.translator import message
 from rcilab.motion.path_import import read_path
 from rcilab.motion.program import Program
-from rcilab.motion.waypoint import LARGEST_BLEND, Waypoint, require_count
+from rcilab.motion.waypoint import Waypoint, require_count
+from rcilab.motion.waypoint_types import LARGEST_BLEND
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,7 +19,8 @@ from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Message, Remark, message
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.program import Program, box_numbers, payload_numbers, payload_of, tool_numbers
-from rcilab.motion.waypoint import BLOCKS, Floats, Waypoint, WaypointType
+from rcilab.motion.waypoint import Waypoint
+from rcilab.motion.waypoint_types import BLOCKS, Floats, WaypointType
 
 TYPES: tuple[WaypointType, ...] = ("joint", "line", "arc", "free")
 """The types with a target, which can be exchanged for each other."""

@@ -19,7 +19,8 @@ from rcilab.i18n.number_parsing import parse_number
 from rcilab.i18n.translator import Message, message
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.joint import MIN_SPEED
-from rcilab.motion.waypoint import ALLOWED, LARGEST_BLEND, LARGEST_OFFSET, LONGEST_DWELL, MOST_REPEATS, Waypoint
+from rcilab.motion.waypoint import Waypoint
+from rcilab.motion.waypoint_types import ALLOWED, LARGEST_BLEND, LARGEST_OFFSET, LONGEST_DWELL, MOST_REPEATS
 
 VIA_FIELDS = ("via_x", "via_y", "via_z")
 _BULGE = 0.25  # Distance of a new via point from the straight line, as a part of the line's length.

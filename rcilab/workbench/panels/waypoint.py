@@ -10,7 +10,8 @@ from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_draft import TYPES, target_of
 from rcilab.app.program.waypoint_fields import CIRCLE_FIELDS, VIA_FIELDS, arm_angle_of
 from rcilab.app.text import Text
-from rcilab.motion.waypoint import ALLOWED, CHOICES, Waypoint
+from rcilab.motion.waypoint import Waypoint
+from rcilab.motion.waypoint_types import ALLOWED, CHOICES
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown, shown_pose
 
 if TYPE_CHECKING:
