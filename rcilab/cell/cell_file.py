@@ -93,7 +93,7 @@ def read_cell(content: bytes, name: str, find_mesh: MeshSource, build: Callable[
     Args:
         content: JSON in UTF-8.
         name: Name of the text, for errors.
-        find_mesh: Returns the mesh of a file with a factor on its lengths; raises InvalidValueError if it does not exist.
+        find_mesh: Returns the mesh of a file with a factor on its lengths; raises InvalidValueError without one.
         build: Builds the cell; raises InvalidValueError for an invalid value.
 
     Raises:
