@@ -44,18 +44,18 @@ _PLOTS = ("q", "dq", "tau", *ERRORS)
 
 def write_html(run: Run, stream: IO[bytes], text: Text) -> None:
     """Writes the page in the language and the units of `text`."""
-    tracking = run.tracking
+    tracking, has_torques = run.tracking, bool(np.isfinite(run.tau).any())
     packed, scales = _Packed(), {name: plot_scale(name, text.units) for name in _PLOTS}
     content = {
         "words": _texts(run, text),
         "run": _pack_run(run, tracking, scales, packed),
-        "charts": [_chart(name, scale, text, run) for name, scale in scales.items()],
+        "charts": [_chart(name, scale, text, run) for name, scale in scales.items() if name != "tau" or has_torques],
         "arm": None if run.model is None else _pack_arm(run.model, run.cell, packed),
         "path": None if run.model is None else _pack_path(run, run.model, tracking, scales["tool"], packed),
         "facts": {
             "errors": error_rows(run, tracking, text),
             "head": {"rms": text("tracking.rms"), "max": text("tracking.max")},
-            "notes": tracking_notes(run, tracking, text),
+            "notes": tracking_notes(run, tracking, text) + ([] if has_torques else [text("plot.no_tau")]),
             "rows": fact_rows(run, text),
         },
     }

@@ -21,7 +21,7 @@ def axis_ticks(low: float, high: float, height: float, limits: tuple[float, ...]
     per_pixel = (high - low) / height
     step = round_step(_ROOMY * per_pixel)
     if step > high:  # Only zero would be labelled.
-        step = round_step(_CLOSE * per_pixel)
+        step = min(round_step(_CLOSE * per_pixel), _round_step_below(high))
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     written = [limit for limit in limits if low <= limit <= high]
     if any(len(_written(limit)) > _SHORT for limit in written):
@@ -34,6 +34,12 @@ def round_step(least: float) -> float:
     """Returns the smallest of 1, 2, 2.5, 5 times a power of ten that is not below a positive number."""
     power = 10.0 ** math.floor(math.log10(least))
     return next(share * power for share in _STEPS if share * power >= least * (1.0 - 1e-9))
+
+
+def _round_step_below(most: float) -> float:
+    """Returns the largest of 1, 2, 2.5, 5 times a power of ten that is not above a positive number."""
+    power = 10.0 ** math.floor(math.log10(most))
+    return max(share * power for share in _STEPS[:-1] if share * power <= most * (1.0 + 1e-9))
 
 
 def _written(value: float) -> str:

@@ -192,6 +192,7 @@ class Renderer:
         first = _RUN if state.watched else 0  # The tab of a page that opens.
         self._live.publish(
             **status_values(seen, status, self._text, self._timeline.end),
+            marks=self._timeline.marks,
             tab=first,
             drawing=state.paths.drawing is not None,
         )

@@ -12,6 +12,7 @@ import pytest
 
 from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.view_actions import SetView
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
 from rcilab.recording.run import build_run
 from rcilab.recording.run_setup import Setup
@@ -51,6 +52,18 @@ def test_a_run_is_shown_against_its_plan_and_downloaded(page, tmp_path):
     run = page.state.recording.run
     assert [float(row["q[1] [rad]"]) for row in rows] == run.q[:, 0].tolist()
     assert "q_plan[1] [rad]" in rows[0]
+
+
+def test_a_fault_has_a_flag_with_its_name_in_the_plots(page):
+    run = some_run()
+    cycles = run.cycles.copy()
+    cycles["faults"][len(cycles) // 2 :] = 1 << Fault.COLLISION
+    page.bench.store.update(recording=whole_recording(replace(run, cycles=cycles)))
+    flags = page.tab.locator(".rl-fault:visible")
+    page.wait(lambda: flags.count() == len(page.state.plots), "a line in every plot")
+    assert page.tab.locator(".rl-fault span:visible").all_inner_texts() == [Fault.COLLISION.manual_name]
+    page.bench.store.update(recording=None)
+    page.wait(lambda: flags.count() == 0, "none without the run")
 
 
 def test_a_long_export_is_cancelled_and_the_next_one_comes(page, tmp_path):

@@ -117,6 +117,17 @@ def test_the_page_is_drawn_in_the_units_of_the_workbench_and_never_finer_than_it
     assert content_of(export_run(RUN, ".html"))["path"]["worst_text"] == "0.63 mm"
 
 
+def test_the_page_of_an_arm_without_joint_torques_says_so_in_place_of_a_plot():
+    cycles = some_cycles().copy()
+    cycles["tau"] = np.nan
+    run = build_run(cycles, plan=RUN.plan, model=RUN.model, setup=SETUP)
+    for language, sentence in (("en", "This arm reports no joint torques."), ("zh", "该机械臂不上报关节力矩。")):
+        content = content_of(export_run(run, ".html", language=language))
+        assert [chart["name"] for chart in content["charts"]] == ["q", "dq", "error", "tool"]
+        assert content["facts"]["notes"][-1] == sentence
+        assert sentence not in content_of(export_run(RUN, ".html", language=language))["facts"]["notes"]
+
+
 def test_the_page_of_an_arm_whose_velocity_bounds_depend_on_its_angles_has_them_as_curves():
     fr3 = load_model("FR3")
     page = export_run(build_run(some_cycles(), plan=None, model=fr3, setup=SETUP), ".html")

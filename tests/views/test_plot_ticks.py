@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from rcilab.views.plot_ticks import axis_ticks
 
-LOWEST = 60.0  # [px] Of the axis of the lowest plot that the page makes.
+LOWEST = 44.0  # [px] Of the axis of the lowest plot that the page makes.
 
 
-@given(st.floats(1e-3, 1e6), st.floats(LOWEST, 400.0), st.booleans(), st.floats(0.2, 1.0) | st.none())
+@given(st.floats(1e-3, 1e6), st.floats(LOWEST, 400.0), st.booleans(), st.floats(0.3, 1.0) | st.none())
 def test_every_plot_has_numbers_to_both_sides_that_do_not_touch(bound, height, is_signed, share):
     low, limits = (-bound if is_signed else 0.0), () if share is None else (-share * bound, share * bound)
     ticks = axis_ticks(low, bound, height, tuple(limit for limit in limits if limit >= low))
@@ -23,6 +23,10 @@ def test_every_plot_has_numbers_to_both_sides_that_do_not_touch(bound, height, i
     assert all(low - 1e-9 * bound <= tick <= bound * (1 + 1e-9) for tick in ticks)
     closest = min(b - a for a, b in itertools.pairwise(ticks))
     assert closest * height / (bound - low) >= 11.0  # [px] Of the font.
+
+
+def test_a_low_plot_of_errors_has_a_number_beside_zero():
+    assert axis_ticks(-0.0462, 0.0462, LOWEST) == (-0.025, 0.0, 0.025)
 
 
 @pytest.mark.parametrize("height", [LOWEST, 100.0, 250.0])

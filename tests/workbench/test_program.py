@@ -19,7 +19,7 @@ from rcilab.app.goal.goal_actions import GoalActions, MoveJoint, MoveTarget, Pos
 from rcilab.app.program import program_actions, program_planning
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import CancelProgram, LoadProgram, PlanProgram, ProgramActions
-from rcilab.app.program.program_draft import describe_place, draft_of, number_at, time_at
+from rcilab.app.program.program_draft import describe_place, draft_of, number_at, time_at, waypoint_times
 from rcilab.app.request import TypeField
 from rcilab.app.run.readiness import may_go_back, may_plan_again, obstacle
 from rcilab.app.store import Store, UiState
@@ -32,6 +32,7 @@ from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint
 from rcilab.motion.program import payload_numbers
+from rcilab.workbench.panels.plot_marks import plot_marks
 from rcilab.workbench.panels.program_list import list_html, notes_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.scene.waypoint_markers import label_of, labels_of
@@ -227,6 +228,20 @@ def test_an_arm_that_is_elsewhere_is_led_to_the_start_first_and_told_so(square):
     starts = plan.motion.segment_starts
     assert [number_at(plan, t + 1e-6) for t in starts] == [0, 1, 2, 3, 0, 1, 2, 3]
     assert np.allclose(plan.motion.goal, alone.goal)
+
+
+def test_the_plots_mark_each_waypoint_and_of_crowded_ones_the_first(square):
+    square.status.q_c = HOME + 0.2
+    square.type("rounds", "2")
+    square.plan()
+    plan, end = square.state.plan, square.state.plan.motion.duration
+    starts = plan.motion.segment_starts
+    arrivals = list(zip([1, 2, 3, 1, 2, 3], [starts[2], starts[3], starts[4], starts[6], starts[7], end], strict=True))
+    assert waypoint_times(plan) == arrivals
+    marks = plot_marks(square.state, end)
+    assert [mark["label"] for mark in marks] == ["1", "2", "3", "1", "2", "3"]
+    assert [mark["share"] for mark in marks] == pytest.approx([t / end for _, t in arrivals], abs=1e-4)
+    assert [mark["label"] for mark in plot_marks(square.state, 100.0 * end)] == ["1"]
 
 
 def test_many_shortened_blends_are_one_line_that_opens_and_marks_on_their_rows(bench):

@@ -23,6 +23,7 @@ from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.store import UiState
 from rcilab.app.text import Text
 from rcilab.app.view_actions import Seek
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import UsageError
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
@@ -30,6 +31,7 @@ from rcilab.recording.run import decode_run
 from rcilab.recording.run_setup import Setup
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.panels.outcome import outcome_html, replay_html
+from rcilab.workbench.panels.plot_marks import plot_marks
 from rcilab.workbench.panels.recording import progress_html, summary_html
 from rcilab.workbench.panels.timeline import TimelinePanel
 from tests.recording.runs import PLAN, export_run, some_ideal_run, some_run
@@ -208,6 +210,8 @@ def test_a_fault_is_marked_and_told_at_the_moment_it_was_reported():
     assert whole_recording(run).moment is None
     goal = goal_at(run.model, np.array(run.model.home))
     state = UiState(model=run.model, goal=goal, recording=recording)
+    flag = {"share": 0.2, "label": Fault.COLLISION.manual_name, "fault": True}
+    assert plot_marks(state, (run.t[40] - recording.delay * CYCLE_TIME) / 0.2) == [flag]
     banner = replay_html(state, SimpleNamespace(phase="closed"), Text("en"))
     assert f"Ended by a fault at {run.t[40]:.3f} s: {Fault.COLLISION.manual_name}." in banner
 

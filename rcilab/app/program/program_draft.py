@@ -347,6 +347,17 @@ def time_at(plan: Plan, number: int) -> float:
     return float(starts[segment + 1]) if segment + 1 < len(starts) else plan.motion.duration
 
 
+def waypoint_times(plan: Plan) -> list[tuple[int, float]]:
+    """Returns number and time, [s], of each arrival at a waypoint of a program's plan, with its dwell."""
+    if plan.program is None:
+        return []
+    starts = plan.motion.segment_starts
+    ends = [*map(float, starts[1:]), plan.motion.duration]
+    numbers = [number_at(plan, end) for end in ends]
+    after = [*numbers[1:], None]
+    return [(here, end) for here, end, next in zip(numbers, ends, after, strict=True) if here and here != next]
+
+
 def describe_place(plan: Plan, time: float) -> Message | None:
     """Returns the name of the segment at a time of a program's plan."""
     number = number_at(plan, time)

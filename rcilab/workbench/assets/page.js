@@ -210,7 +210,7 @@
     if (news.notices) showNotices(news.notices);
     if (!greeted && said.stopHint) welcome();
     greeted = true;
-    if ("cursor" in news) followSoon();
+    if ("cursor" in news || "marks" in news) followSoon();
     if ("holder" in news || "take" in news || "question" in news) hold();
     if (news.viser) document.documentElement.dataset.rlViser = news.viser;
     if (news.theme) document.documentElement.dataset.rlTheme = news.theme;
@@ -274,12 +274,29 @@
     }
   };
 
+  // Waypoints and fault: a line in every plot; the name of the fault, which is long, in the first one.
+  const mark = (over, marks, isFirst) => {
+    const key = JSON.stringify([marks, isFirst]);
+    if (over.dataset.rlMarks === key) return;
+    over.dataset.rlMarks = key;
+    over.querySelectorAll(".rl-mark").forEach((old) => old.remove());
+    for (const { share, label, fault } of marks) {
+      const line = document.createElement("div");
+      line.className = "rl-mark" + (fault ? " rl-fault" : "") + (share > 0.5 ? " rl-left" : "");
+      line.style.left = (share * 100).toFixed(2) + "%";
+      if (!fault || isFirst) line.append(Object.assign(document.createElement("span"), { textContent: label }));
+      over.appendChild(line);
+    }
+  };
+
   // The time cursor: one line in every plot whose x axis is the motion's time; a click there moves it.
   const follow = () => {
     const cursor = said.cursor;
     keepTab();
     if (toast.className) place();  // What is said while a page loads is said before there is a scene.
-    document.querySelectorAll(".u-over").forEach((over) => {
+    const overs = [...document.querySelectorAll(".u-over")], first = overs.find((over) => over.offsetParent);
+    overs.forEach((over) => {
+      mark(over, said.marks || [], over === first);
       let line = over.querySelector(".rl-cursor");
       if (!line) {
         line = document.createElement("div");

@@ -32,6 +32,7 @@ from rcilab.views.plots import (
 )
 from rcilab.views.tool_curves import TOOL_QUANTITIES, ToolQuantity, tool_curves, tool_limit
 from rcilab.workbench.panels.plot_contents import legend_html, plot_axes, plot_contents
+from rcilab.workbench.panels.plot_marks import plot_marks
 from rcilab.workbench.widgets import Html, esc
 
 if TYPE_CHECKING:
@@ -66,6 +67,8 @@ class Plots:
         self._last = 1.0  # [s] End of everything that is drawn.
         self.end = 1.0
         """End of the time axis, [s]."""
+        self.marks: list[dict[str, Any]] = []
+        """Waypoints and fault on the time axis, see `plot_marks`."""
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds a plot of every kind; those that are not chosen are hidden."""
@@ -120,6 +123,7 @@ class Plots:
             self._drawn, self._last = wanted, _last(state)
             for name in visible:
                 self._draw(state, name)
+            self.marks = plot_marks(state, self.end)
             has_actual = state.recording is not None
             self._legend.show(
                 legend_html(

@@ -35,6 +35,11 @@ class TimelinePanel:
         """End of the time axis, [s]."""
         return self._plots.end
 
+    @property
+    def marks(self) -> list[dict[str, Any]]:
+        """Marks on the time axis, for the page's script."""
+        return self._plots.marks
+
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls and empty plots."""
         text, ask = self._text, self._ask
