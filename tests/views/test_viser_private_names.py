@@ -75,16 +75,17 @@ def test_the_listed_modules_exist() -> None:
             importlib.import_module(module)
 
 
-def test_only_benchmarks_and_the_script_for_labels_use_the_hooks_of_the_page() -> None:
+def test_only_benchmarks_and_the_scripts_for_labels_and_scene_use_the_hooks_of_the_page() -> None:
     users = {
         path.relative_to(PACKAGE).as_posix()
         for path in PACKAGE.rglob("*")
         if path.suffix in (".py", ".js") and any(hook in path.read_text(encoding="utf-8") for hook in HOOKS)
     }
-    assert {user for user in users if not user.startswith("diagnostics/bench/")} == {"workbench/assets/labels.js"}
+    scripts = {f"workbench/assets/{name}.js" for name in ("labels", "scene3d")}
+    assert {user for user in users if not user.startswith("diagnostics/bench/")} == scripts
 
 
-@pytest.mark.parametrize("script", ["folds", "labels", "marks", "names", "resend"])
+@pytest.mark.parametrize("script", ["folds", "labels", "marks", "names", "resend", "scene3d"])
 def test_a_script_that_works_around_viser_says_what_would_make_it_unnecessary(script: str) -> None:
     head = (PACKAGE / "workbench" / "assets" / f"{script}.js").read_text(encoding="utf-8").partition("(() => {")[0]
     assert "// Unnecessary once viser " in head
