@@ -321,9 +321,12 @@ class RunActions:
             if outcome.what == "execute" and isinstance(outcome.error, ControlError) and self._reached is None:
                 self._reached = 0.0  # It had begun, but no status showed it.
             self._is_stop_said = outcome.error.code == SAFETY_STOP
-            cause = ROBOT_NOT_READY if _lasts_until_ready(outcome.error) else ""
+            is_in_fault = self._connection.status().phase == "fault"
+            cause = ROBOT_NOT_READY if is_in_fault or _lasts_until_ready(outcome.error) else outcome.what
             self._store.notify(*self._report_failure(outcome, outcome.error), cause=cause)
-        elif outcome.what == "power_on":
+            return
+        self._store.clear_notices(outcome.what)
+        if outcome.what == "power_on":
             self._powered = True
         elif outcome.what == "reboot":
             self._store.notify("warn", message("signals.rebooted"))

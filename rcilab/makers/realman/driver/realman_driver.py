@@ -144,11 +144,11 @@ class RealManDriver(LibraryDriver[NumberedPush]):
         self._settings.clear_errors()
         latest = link.latest
         if latest is not None and latest.robot_mode is RobotMode.USER_STOPPED:
-            raise DeadlineError(f"{self.name}: {_ESTOP}").coded("not_cleared", faults=_ESTOP, seconds="0")
+            raise DeadlineError(f"{self.name}: {_ESTOP}").coded("still_pressed")
         if latest is not None and latest.faults:
             names = name_faults(latest.faults)
             raise DeadlineError(f"{self.name}: {names} did not clear: remove the cause first").coded(
-                "not_cleared", faults=names, seconds="0"
+                "still_set", faults=names
             )
         self.power(True)
         link.wait(lambda: link.is_enabled, _RECOVERED)

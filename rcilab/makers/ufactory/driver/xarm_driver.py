@@ -132,7 +132,7 @@ class XArmDriver(LibraryDriver[bytes]):
         if link.error:
             text = describe_error(link.error)
             raise DeadlineError(f"{self.name}: {text}; it did not clear: remove its cause first").coded(
-                "not_cleared", faults=f"C{link.error}", seconds="0"
+                "still_set", faults=f"C{link.error}"
             )
         self.power(True)
         link.wait(lambda: link.shown.state < STOPPED and link.is_still, _RECOVERED)  # It may still brake.
