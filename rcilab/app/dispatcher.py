@@ -10,17 +10,19 @@ from dataclasses import replace
 from typing import Generic, TypeVar
 
 from rcilab.app.autosave import Autosave, SavedState
-from rcilab.app.cell.cell_actions import CellActions
+from rcilab.app.cell.cell_actions import CellActions, EditCell
 from rcilab.app.check.check_actions import CheckActions
 from rcilab.app.connection import PageConnection
 from rcilab.app.control_lock import ClientHeartbeat
 from rcilab.app.control_lock_actions import ControlLockActions, Refuse
+from rcilab.app.edit_history import EditHistory
 from rcilab.app.failures import Failures
-from rcilab.app.goal.goal_actions import GoalActions
+from rcilab.app.goal.goal_actions import GoalActions, PoseGoal
 from rcilab.app.goal.named_pose_actions import NamedPoseActions
 from rcilab.app.jog.jog_actions import JogActions
 from rcilab.app.learn.learn_actions import LearnActions
 from rcilab.app.link.link_actions import LinkActions
+from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import ProgramActions
 from rcilab.app.request import Moving, Request, TypeField
 from rcilab.app.run.export_actions import Deliver, ExportActions
@@ -35,7 +37,7 @@ from rcilab.app.run.watch_actions import WatchActions
 from rcilab.app.run.world_actions import WorldActions
 from rcilab.app.scene.scene_actions import SceneActions
 from rcilab.app.setup.configuration_state import name_parts
-from rcilab.app.setup.setup_actions import OpenTab, SetupActions, is_setup_field
+from rcilab.app.setup.setup_actions import OpenTab, PressSetup, SetupActions, is_setup_field
 from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store
 from rcilab.app.view_actions import DrawInSoftware, SetView, ViewActions
@@ -119,6 +121,15 @@ class Dispatcher:
         self._check = CheckActions(store, connection, self._goal, self._program)
         self._learn = LearnActions(store, connection)
         self._link = LinkActions(store, connection, self.run, self._program, self._cell)
+        self._history = EditHistory(
+            store,
+            {
+                "goal": lambda what: self._goal.pose_goal(PoseGoal(name=what)),
+                "program": lambda what: self._program.editing.edit(EditProgram(what=what)),
+                "cell": lambda what: self._cell.edit(EditCell(what=what)),
+                "setup": lambda what: self._setup.press(PressSetup(what=what)),
+            },
+        )
         self._view = ViewActions(store)
         self._control_lock = ControlLockActions(store, connection, presence or ClientHeartbeat())
         self._scene = SceneActions(store, self._goal)
@@ -136,7 +147,7 @@ class Dispatcher:
             self._goal, self._poses, self._scene, self._setup, self._cell, self._jog, self._push, self._program,
             self._program.editing, self._program.paths, self._check, self._learn, self.run, self._target_robot,
             self._mode, self._world, self._signals, self._view, self._export, self._folder, self._control_lock,
-            self._link,
+            self._link, self._history,
         )  # fmt: skip
         self._handlers = {kind: act for feature in features for kind, act in feature.handlers.items()}
         self._handlers |= {
@@ -237,6 +248,7 @@ class Dispatcher:
         self._check.tick()
         self._learn.tick()
         self._scene.tick()
+        self._history.tick()
         self._autosave.keep(self._store.state)
 
     def _resume(self, kept: SavedState) -> None:

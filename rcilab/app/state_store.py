@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from rcilab.app.app_state import AppState, Toast
+from rcilab.app.edit_order import EditOrder
 from rcilab.app.goal.goal import Goal, Tone
 from rcilab.i18n.translator import Message
 
@@ -27,6 +28,9 @@ class StateStore(Generic[S]):
         self._lock = threading.Lock()
         self._state = state
         self._past: list[Goal] = []
+        self._future: list[Goal] = []
+        self.order = EditOrder()
+        """The order of the edits of all features."""
         self._notices = 0
         self.changed = threading.Event()
         """Set when a request has been carried out, cleared by the view that shows it."""
@@ -84,12 +88,26 @@ class StateStore(Generic[S]):
 
     def push_undo(self) -> None:
         """Stores the current goal for `undo`."""
-        self._past = [*self._past[-UNDO_DEPTH:], self._state.goal]
+        self._past, self._future = [*self._past[-UNDO_DEPTH:], self._state.goal], []
+        self.order.add("goal", self._state.model.name)
 
     def undo(self) -> Goal | None:
-        """Returns the goal that was stored last, or None."""
-        return self._past.pop() if self._past else None
+        """Returns the goal that was stored last, or None; `redo` returns the current one."""
+        if not self._past:
+            return None
+        self._future.append(self._state.goal)
+        self.order.undone("goal", self._state.model.name)
+        return self._past.pop()
+
+    def redo(self) -> Goal | None:
+        """Returns the goal before the last `undo`, or None."""
+        if not self._future:
+            return None
+        self._past.append(self._state.goal)
+        self.order.repeated("goal", self._state.model.name)
+        return self._future.pop()
 
     def clear_undo(self) -> None:
         """Clears the undo history: it belongs to another arm."""
-        self._past = []
+        self._past, self._future = [], []
+        self.order.forget("goal", self._state.model.name)

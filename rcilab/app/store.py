@@ -80,6 +80,8 @@ class UiState(AppState):
     """Joint shown in the plots, from 1; 0 shows all."""
     plots: frozenset[str] = frozenset({"q", "dq", "ddq", "jerk", "error", "tool"})
     """The visible plots; those of errors once there are some."""
+    turns: tuple[bool, bool] = (False, False)
+    """Whether there is an edit to undo, and one to repeat, on the whole page."""
     language: str = "en"
     units: Units = USUAL
     """Units in which angles and lengths are shown and typed; values are stored in SI."""

@@ -18,6 +18,7 @@ from rcilab.app.connection import PageConnection
 from rcilab.app.control_lock import ClientHeartbeat
 from rcilab.app.control_lock_actions import AnswerControls, PageClosed, PageOpened, Refuse, TakeControls
 from rcilab.app.dispatcher import Dispatcher
+from rcilab.app.edit_history import TurnBack
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import ChooseBranch
 from rcilab.app.link.link_actions import AnswerLink, OpenLink
@@ -257,6 +258,8 @@ class Workbench:
                 return ShowRows(page=page, index=index)
             case live.Draw(what):
                 return DrawPath(page=page, what=what)
+            case live.Turn(what):
+                return TurnBack(page=page, what=what)
             case live.Edit(what, key, index):
                 return EditProgram(page=page, what=what, key=key, index=index)
         raise AssertionError(message)

@@ -169,6 +169,12 @@ class Draw(PageMessage):
     what: Literal["end", "cancel"]
 
 
+class Turn(PageMessage):
+    """The last edit on the page is undone, or repeated."""
+
+    what: Literal["undo", "redo"]
+
+
 class Edit(PageMessage):
     """An action in the list of waypoints."""
 
@@ -208,6 +214,7 @@ _DECODER = msgspec.json.Decoder(
     | Rows
     | Draw
     | Edit
+    | Turn
 )
 
 

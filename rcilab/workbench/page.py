@@ -49,6 +49,7 @@ def decorate(index: bytes, quality: str = "full") -> bytes:
         "jog_devices",
         "draw",
         "palette",
+        "history",
         "link",
     )
     script = b"\n".join((assets / f"{name}.js").read_bytes() for name in scripts)

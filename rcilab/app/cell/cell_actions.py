@@ -400,6 +400,7 @@ class CellActions:
         history = self._history
         if drag is None or drag != self._drag:
             history.past = [*history.past[-UNDO_DEPTH:], history.cell]
+            self._store.order.add("cell", self._store.state.model.name)
         self._drag = None if has_ended else drag
         history.cell, history.future = cell, []
         self._set(cell=cell)
@@ -411,6 +412,8 @@ class CellActions:
         if not here:
             return
         there.append(history.cell)
+        order, name = self._store.order, self._store.state.model.name
+        order.undone("cell", name) if what == "undo" else order.repeated("cell", name)
         before, history.cell = history.cell, here.pop()
         self._drag = None
         self._store.clear_problems("cell.")

@@ -41,7 +41,7 @@ _ONE_DRAG = 1.0  # [s] Changes within this time belong to one drag, or one use o
 RESTED = 0.6  # [s] The same for a gizmo that is still held: the operator may only pause.
 
 
-PoseName: TypeAlias = Literal["zero", "home", "here", "start", "undo"]
+PoseName: TypeAlias = Literal["zero", "home", "here", "start", "undo", "redo"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,8 +203,8 @@ class GoalActions:
     def pose_goal(self, request: PoseGoal) -> None:
         """Sets the goal to a named pose."""
         state, self._dragged = self._store.state, ""
-        if request.name == "undo":
-            goal = self._store.undo()
+        if request.name in ("undo", "redo"):
+            goal = self._store.undo() if request.name == "undo" else self._store.redo()
             if goal is not None:
                 self._store.clear_problems(*_FIELDS)
                 self._store.update(goal=goal)

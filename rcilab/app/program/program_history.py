@@ -77,6 +77,7 @@ class ProgramHistory:
             typed: Whether a number was typed: the problems of other fields stay.
         """
         history, problems = self._current, self._store.state.problems
+        self._store.order.add("program", self.draft.model)
         history.past, history.future = [*history.past[-_UNDO_DEPTH:], self.draft], []
         self._exchange(draft, selected)
         if typed:
@@ -85,6 +86,7 @@ class ProgramHistory:
     def rename(self, name: str) -> None:
         """Renames the program, which changes no plan of it."""
         state, history = self.state, self._current
+        self._store.order.add("program", self.draft.model)
         history.past, history.future = [*history.past[-_UNDO_DEPTH:], self.draft], []
         draft = replace(self.draft, name=name)
         planned = draft if state.planned is state.draft else state.planned
@@ -94,12 +96,14 @@ class ProgramHistory:
         """Undoes the last change."""
         if self._current.past:
             self._current.future.append(self.draft)
+            self._store.order.undone("program", self.draft.model)
             self._exchange(self._current.past.pop(), self.state.selected)
 
     def redo(self) -> None:
         """Repeats the change that was undone last."""
         if self._current.future:
             self._current.past.append(self.draft)
+            self._store.order.repeated("program", self.draft.model)
             self._exchange(self._current.future.pop(), self.state.selected)
 
     def answer(self, name: str, problem: Message | None) -> bool:

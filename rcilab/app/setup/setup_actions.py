@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar, Literal, cast
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias, cast
 
 import numpy as np
 
@@ -113,7 +113,11 @@ class SetSetup(Request):
 class PressSetup(Request):
     """A button of the configuration."""
 
-    what: Literal["whole", "undo", "send", "confirm", "cancel"]
+    what: Literal["whole", "undo", "redo", "send", "confirm", "cancel"]
+
+
+_Edited: TypeAlias = tuple[RobotConfiguration, frozenset[SetupPart]]
+"""The configuration, and its edited parts."""
 
 
 class SetupActions:
@@ -121,9 +125,8 @@ class SetupActions:
 
     def __init__(self, store: Store, connection: PageConnection) -> None:
         self._store, self._connection = store, connection
-        self._past: list[
-            tuple[RobotConfiguration, frozenset[SetupPart]]
-        ] = []  # The configuration, and the edited parts.
+        self._past: list[_Edited] = []
+        self._future: list[_Edited] = []
         self._arm = store.state.model.name
         self._drag: tuple[int | None, str] | None = None  # The page that drags, and the part.
         self._dragged = -math.inf  # Time of the last drag event, [s].
@@ -282,8 +285,8 @@ class SetupActions:
         """Handles one of the buttons."""
         state = self._store.state
         setup = state.setup
-        if request.what == "undo":
-            self._undo()
+        if request.what in ("undo", "redo"):
+            self._turn_back("undo" if request.what == "undo" else "redo")
         elif request.what == "whole":
             self._store.clear_problems("setup.joints.")
             self._limit_joints(own_limits(self._store.state))
@@ -309,7 +312,7 @@ class SetupActions:
             part for part, differs in differing.items() if differs and explain_missing_part(model, part) is None
         }
         if parts:
-            self._past = [*self._past[-UNDO_DEPTH:], (setup.wanted, setup.touched)]
+            self._push_undo(setup)
             wanted = setup.wanted.updated(wanted.only(parts))
             self._take(replace(setup, wanted=wanted, touched=setup.touched | parts, inertia=None), parts)
 
@@ -327,7 +330,8 @@ class SetupActions:
         """Follows a request, and sends changes to a virtual controller."""
         name = self._store.state.model.name
         if name != self._arm:
-            self._arm, self._past, self._announced = name, [], 0
+            self._arm, self._past, self._future, self._announced = name, [], [], 0
+            self._store.order.forget("setup", name)
             self._sender.forget()
         if self._sender.is_underway:
             self._sender.collect()
@@ -368,15 +372,23 @@ class SetupActions:
             self._store.notify("warn", missing)
             return
         if drag is None or drag != self._drag:
-            now = self._store.state.setup
-            self._past = [*self._past[-UNDO_DEPTH:], (now.wanted, now.touched)]
+            self._push_undo(self._store.state.setup)
         self._drag = drag
         self._take(replace(changed, touched=changed.touched | {part}), {part})
 
-    def _undo(self) -> None:
-        if not self._past:
+    def _push_undo(self, setup: SetupState) -> None:
+        self._past, self._future = [*self._past[-UNDO_DEPTH:], (setup.wanted, setup.touched)], []
+        self._store.order.add("setup", self._store.state.model.name)
+
+    def _turn_back(self, what: Literal["undo", "redo"]) -> None:
+        """Undoes the last edit, or repeats the one that was undone last."""
+        setup, order, name = self._store.state.setup, self._store.order, self._store.state.model.name
+        here, there = (self._past, self._future) if what == "undo" else (self._future, self._past)
+        if not here:
             return
-        setup, (before, touched) = self._store.state.setup, self._past.pop()
+        there.append((setup.wanted, setup.touched))
+        order.undone("setup", name) if what == "undo" else order.repeated("setup", name)
+        before, touched = here.pop()
         touched |= frozenset(self._connection.status().setup.parts)  # Parts that were sent have to be reset there.
         if self._sender.is_underway:
             touched |= setup.touched

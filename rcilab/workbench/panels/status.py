@@ -58,6 +58,11 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         **scene_tools(state, status, text),
         "keys": [[text(f"key.{key}"), text(f"key.{key}_does")] for key in _KEYS],
         "palette": {name: text(f"palette.{name}") for name in ("title", "find", "none", "tab", "scene")},
+        "history": {
+            "undo": text("bar.undo"),
+            "redo": text("bar.redo"),
+            "can": dict(zip(("undo", "redo"), state.turns, strict=True)),
+        },
         "lost": text("bar.lost"),
         "quality": state.quality,
         "software": text("bar.software") if state.quality == "full" else "",
