@@ -173,8 +173,13 @@ class CycleCapture:
         """Writes the row of this cycle; call it after its state was sent."""
         state, playback, playout = self._controller.state, self._arm.playback, self._playout
         is_following = playback is not None or self._arm.is_following
+        is_between = is_following and self._controller.is_between_motions
+        if is_between:
+            playback, is_following = None, False
         if is_following is not self._is_moving:
             self._follow_motion(state, is_following)
+        if is_between:
+            self._forget_commands()
         count, number = self._count, state.message_id
         played = age = missed = 0
         arrival: _Arrival | None = None
@@ -359,7 +364,10 @@ class CycleCapture:
                 "duplicates": playout.duplicates,
             }
         )
-        # For the next motion, whose first commands may arrive before its first row, and answer states of this one.
+        self._forget_commands()
+
+    def _forget_commands(self) -> None:
+        """Begins anew for the next motion, whose first commands may arrive before its first row, for earlier states."""
         self._received = self._unrecorded = self._late = self._lost = 0
         self._offset = None
         self._lowest, self._has_played = sys.maxsize, False

@@ -130,6 +130,11 @@ class SimulatedController(Protocol):
         ...
 
     @property
+    def is_between_motions(self) -> bool:
+        """Whether the arm stands after a motion that the controller planned, though it may still follow the planner."""
+        ...
+
+    @property
     def wants_commands(self) -> bool:
         """Whether a motion is in progress that needs one command per cycle; False for planned motions."""
         ...

@@ -93,7 +93,7 @@ class FciController:
         version: The version of the interface.
     """
 
-    loop_back = False
+    loop_back = is_between_motions = False
     auto_limit = False
     buttons: tuple[SafetyButton, ...] = ("estop",)
 

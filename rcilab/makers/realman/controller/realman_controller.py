@@ -181,6 +181,13 @@ class RealManController:
         """Whether the arm moves, or will."""
         return not self.drive.is_still or self.drive.is_stopping
 
+    @property
+    def is_between_motions(self) -> bool:
+        """Whether the arm stands after a planned motion; after streamed commands more may still come."""
+        planner = self.drive.planner
+        is_planned = planner.streamed is None and self.program is None
+        return is_planned and not (self.is_moving or planner.queued)
+
     def set_input(self, signal: int, level: bool) -> None:
         """Sets the level of a digital input.
 

@@ -83,6 +83,7 @@ class RealManServer:
         self._pushed_to: tuple[Peer, int] | None = None
         self._files: dict[Peer, Request] = {}  # Announced, by client.
         self._accepted: dict[Peer, int] = {}  # Cycle of the last accepted motion, by client.
+        self._was_in_motion = False
         self._events: list[tuple[int, Peer, Mapping[str, object]]] = []  # With the cycle in which each is sent.
         controller.on_end = self._report_end
         controller.on_log = self._log
@@ -159,6 +160,7 @@ class RealManServer:
             self._answer(running.peer, event)
         if self._events:
             self._send_events()
+        self._log_motion()
 
     def send_states(self) -> None:
         """Pushes the state when its period is over."""
@@ -241,6 +243,16 @@ class RealManServer:
                 self._answer(peer, event)
             else:
                 self._events.append((due, peer, event))
+
+    def _log_motion(self) -> None:
+        controller = self.controller
+        is_in_motion = controller.arm.is_following and not controller.is_between_motions
+        if is_in_motion is not self._was_in_motion:
+            self._was_in_motion = is_in_motion
+            if is_in_motion:
+                self._link.log("motion_started", "motion started")
+            else:
+                self._link.log("motion_ended", f"motion ended; the arm is {controller.phase_name}")
 
     def _log(self, kind: str, text: str) -> None:
         self._link.log(kind, text)

@@ -108,6 +108,8 @@ class RciController:
 
     buttons: tuple[SafetyButton, ...] = ("estop", "gstop")
 
+    is_between_motions = False
+
     def __init__(
         self,
         arm: VirtualArm,

@@ -252,6 +252,11 @@ class XArmController:
         return self.planner.state is PlannerState.MOVING or self._is_guided or not self.arm.commanded.is_stationary
 
     @property
+    def is_between_motions(self) -> bool:
+        """Whether the arm stands after a planned motion; in mode 1, targets may still come."""
+        return self.mode is not Mode.SERVO and not (self.is_moving or self.planner.queued)
+
+    @property
     def has_motors(self) -> bool:
         """Whether the motors of all joints are on."""
         return self.enabled & self._all == self._all
