@@ -46,6 +46,7 @@ _HEAVIEST_LOAD = 20.0  # [kg] rcilab's own bound, for kilograms given as grams.
 _QUIET = 5  # Reports without a motion until it has ended: the first ones may be older than its command.
 _STANDS = 1.0  # [s] For a stopped arm to stand.
 _BOUNDARY = (-32768, 32767)  # [mm] Numbers of 16 bits.
+_ENDS, _FENCE = 1, 5  # Places in the answer of get_reduced_states.
 _ROUNDING = 1e-6  # [mm] Rounding of lengths that are whole millimetres.
 _SAME_ANGLE = 1e-6  # [rad]
 _MODES = (0, 1, 2, 4, 5, 6, 7)
@@ -121,6 +122,17 @@ class XArmSettings:
         """Sets the direction of gravity in base, for an arm that does not stand upright, shape (3,)."""
         values = bounded_vector("direction", direction, _AXES, "1", -1.0, 1.0)
         self._set("set_gravity_direction", values.tolist(), wait=False)
+
+    def read_boundary(self) -> SafetyBox | None:
+        """Returns the boundary of the tool that the controller has; None: an old firmware does not report it whole."""
+        states = self._call("get_reduced_states", is_radian=True)
+        if len(states) <= _FENCE:
+            return None
+        ends = MILLIMETRE * np.array(states[_ENDS], float).reshape(3, 2)  # Largest and least.
+        size = ends[:, 0] - ends[:, 1]
+        if (size <= 0.0).any():
+            return None
+        return SafetyBox(size=tuple(size), T_base_box=Pose(ends.mean(axis=1)), active=bool(states[_FENCE]))
 
     def set_boundary(self, box: SafetyBox) -> None:
         """Sets the boundary of the tool (set_reduced_tcp_boundary), to whole millimetres inwards, and if it acts.

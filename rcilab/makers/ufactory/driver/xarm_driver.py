@@ -95,8 +95,8 @@ class XArmDriver(LibraryDriver[bytes]):
         self._settings = XArmSettings(connection, arm_name)
 
     def read_configuration(self) -> RobotConfiguration:
-        """Returns the load that is set."""
-        return RobotConfiguration(load=self._settings.load)
+        """Returns the load and the boundary of the tool that are set."""
+        return RobotConfiguration(load=self._settings.load, box=self._settings.read_boundary())
 
     def open_commands(self, arm: ConfiguredArm, lock: RequestLock) -> XArmSessionCommands:
         """Returns the commands of the interface for a session."""

@@ -6,15 +6,21 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from rcilab.app.setup.configuration_state import describe_held
+from rcilab.app.text import Text
 from rcilab.conformance.check import check
 from rcilab.control_process import Supervisor
 from rcilab.control_process.launch import start_controller
 from rcilab.core.errors import ConnectionLostError, ControlError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
 from rcilab.execution.simulation_control import SimulationControl
+from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.ufactory.errors import UfactoryError
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
@@ -65,6 +71,19 @@ def test_a_motion_arrives_and_its_rows_are_those_of_the_reports(supervisor):
     index = np.minimum(np.rint(sent["t"] * 1000).astype(int), len(motion.q) - 1)
     assert np.array_equal(sent["command"], motion.q[index])
     assert not (np.diff(sent["message_id"]) % 5).any()
+
+
+def test_the_boundary_is_shown_in_the_whole_millimetres_that_the_controller_keeps(supervisor):
+    box = SafetyBox(size=(1.4004, 1.4, 1.4), T_base_box=Pose([0.0, 0.0, 0.5]))
+    supervisor.configure(RobotConfiguration(box=box)).wait(SOON)
+    held = supervisor.status().reported.box
+    assert held is not None
+    assert held.active
+    np.testing.assert_allclose(held.size, (1.4, 1.4, 1.4), atol=1e-9)
+    np.testing.assert_allclose(held.T_base_box.position, (0.0, 0.0, 0.5), atol=1e-9)
+    assert Text("en").render(describe_held(supervisor.status(), "box")).startswith("on, 1400 × 1400 × 1400")
+    supervisor.configure(RobotConfiguration(box=replace(box, active=False))).wait(SOON)
+    assert not supervisor.status().reported.box.active
 
 
 def test_a_motion_is_paused_on_its_path_and_stopped(supervisor):
