@@ -18,6 +18,7 @@ def test_an_obstacle_is_added_dragged_into_the_way_typed_out_of_it_and_deleted(p
     plan = page.state.plan
     place = page.state.model.forward(plan.motion.at(0.5 * plan.motion.duration).q).position
     fields = page.group("rl-trios").locator("visible=true").locator(".mantine-TextInput-root input")
+    page.wait(lambda: fields.count() == 7, "the fields of a sphere")
     for number, coordinate in enumerate(place):
         fields.nth(number).fill(f"{1000.0 * coordinate:.1f}")
         fields.nth(number).press("Enter")

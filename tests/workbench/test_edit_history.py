@@ -63,7 +63,7 @@ def test_edits_of_all_sorts_are_undone_and_repeated_in_their_order(bench: Workbe
     wait(lambda: bench.store.state.notices[-1].text.code == "edit.nothing_undo", "the end of the history")
     wait(lambda: state().turns == (False, True), "the order")
     bar = status_values(state(), bench.session.status(), Text("zh"), 1.0)["history"]
-    assert bar == {"undo": "撤销", "redo": "重做", "can": {"undo": False, "redo": True}}
+    assert bar == {"undo": "撤回上一次编辑", "redo": "恢复撤回的编辑", "can": {"undo": False, "redo": True}}
 
 
 def test_each_arm_has_its_own_order_and_a_new_edit_ends_what_could_be_repeated() -> None:

@@ -3,7 +3,7 @@
 (() => {
   "use strict";
   const MOST = 60;  // Tuning value: entries that are drawn; typing narrows them.
-  const PAUSE = 30, PATIENCE = 3000;  // [ms] Between two looks for a control of a tab that is being opened, and for how long.
+  const PAUSE = 30, PATIENCE = 10000;  // [ms] Between two looks for a control of a tab that is being opened, and for how long.
   let words = {}, box = null, input = null, list = null, entries = [], shown = [], at = 0, before = null;
   window.addEventListener("rl-news", ({ detail }) => { if (detail.palette) { words = detail.palette; label(); } });
 
