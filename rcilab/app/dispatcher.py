@@ -14,7 +14,14 @@ from rcilab.app.cell.cell_actions import CellActions, EditCell
 from rcilab.app.check.check_actions import CheckActions
 from rcilab.app.connection import PageConnection
 from rcilab.app.control_lock import ClientHeartbeat
-from rcilab.app.control_lock_actions import ControlLockActions, Refuse
+from rcilab.app.control_lock_actions import (
+    AnswerControls,
+    ControlLockActions,
+    PageClosed,
+    PageOpened,
+    Refuse,
+    TakeControls,
+)
 from rcilab.app.edit_history import EditHistory
 from rcilab.app.failures import Failures
 from rcilab.app.goal.goal_actions import GoalActions, PoseGoal
@@ -25,28 +32,46 @@ from rcilab.app.link.link_actions import LinkActions
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import ProgramActions
 from rcilab.app.request import Moving, Request, TypeField
-from rcilab.app.run.export_actions import Deliver, ExportActions
-from rcilab.app.run.folder_actions import FolderActions
+from rcilab.app.run.export_actions import CancelExport, Deliver, ExportActions, ExportRun
+from rcilab.app.run.folder_actions import ClearRuns, FolderActions
 from rcilab.app.run.mode_actions import ModeActions
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.push_actions import PushActions
+from rcilab.app.run.replay_actions import CloseRun, OpenRun, ReplayActions
 from rcilab.app.run.run_actions import RobotCommand, RunActions
 from rcilab.app.run.signal_actions import SignalActions
 from rcilab.app.run.target_robot_actions import TargetRobotActions
 from rcilab.app.run.watch_actions import WatchActions
-from rcilab.app.run.world_actions import WorldActions
+from rcilab.app.run.world_actions import PressSafety, WorldActions
 from rcilab.app.scene.scene_actions import SceneActions
 from rcilab.app.setup.configuration_state import name_parts
 from rcilab.app.setup.setup_actions import OpenTab, PressSetup, SetupActions, is_setup_field
 from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store
-from rcilab.app.view_actions import DrawInSoftware, SetView, ViewActions
+from rcilab.app.view_actions import (
+    CommitField,
+    DrawInSoftware,
+    DropProblem,
+    Play,
+    Seek,
+    SetRecording,
+    SetView,
+    ShowPlot,
+    ViewActions,
+)
 from rcilab.core.errors import RcilabError
 from rcilab.core.memory import memory_needed
 from rcilab.i18n.translator import message
 
 _TICK = 0.03  # [s] About the display's rate; also the interval between two reads of the robot's status.
 _REFUSAL_INTERVAL = 1.0  # [s] Minimum time between two answers to a page that acts without the controls.
+
+_DURING_REPLAY = (
+    Seek, Play, SetView, ShowPlot, SetRecording, CommitField, DropProblem, DrawInSoftware, OpenTab, ExportRun,
+    CancelExport, ClearRuns, OpenRun, CloseRun, PressSafety, TakeControls, AnswerControls, PageOpened, PageClosed,
+    Refuse,
+)  # fmt: skip
+"""What a page may ask for while it shows a recorded run, besides Stop: nothing that plans or moves."""
 
 T = TypeVar("T")
 
@@ -135,6 +160,7 @@ class Dispatcher:
         self._scene = SceneActions(store, self._goal)
         self._export = ExportActions(store, deliver)
         self._folder = FolderActions(store)
+        self._replay = ReplayActions(store, connection)
         self._watch = watch
         self._requests: CoalescingQueue[Request] = CoalescingQueue()
         self._thread: threading.Thread | None = None
@@ -147,7 +173,7 @@ class Dispatcher:
             self._goal, self._poses, self._scene, self._setup, self._cell, self._jog, self._push, self._program,
             self._program.editing, self._program.paths, self._check, self._learn, self.run, self._target_robot,
             self._mode, self._world, self._signals, self._view, self._export, self._folder, self._control_lock,
-            self._link, self._history,
+            self._link, self._history, self._replay,
         )  # fmt: skip
         self._handlers = {kind: act for feature in features for kind, act in feature.handlers.items()}
         self._handlers |= {
@@ -204,6 +230,7 @@ class Dispatcher:
         self._scene.close()
         self.run.close()
         self._export.close()
+        self._replay.close()
         self._autosave.close(self._store.state)
 
     def act(self, request: Request) -> None:
@@ -212,6 +239,10 @@ class Dispatcher:
         if request.needs_control and not lock.allows(request.page) and not _is_stop(request):
             if not request.is_silent:
                 self._refuse(request)
+            return
+        if self._store.state.replay is not None and not (isinstance(request, _DURING_REPLAY) or _is_stop(request)):
+            if not request.is_silent:
+                self._replay.refuse()
             return
         if _reloads_pages(request) and is_moving(self._connection.status()):
             self._store.notify("warn", message("ready.moving"), page=request.page)
@@ -243,6 +274,7 @@ class Dispatcher:
         self._jog.tick(elapsed)
         self._poses.tick()
         self._folder.tick()
+        self._replay.tick()
         self._program.tick()
         self._program.paths.tick()
         self._check.tick()

@@ -26,8 +26,10 @@ from rcilab.i18n.units import USUAL, Units
 
 if TYPE_CHECKING:
     from rcilab.app.run.export_actions import Export
+    from rcilab.app.run.replay import Replay
     from rcilab.cell.cell import Cell
     from rcilab.model.robot_model import RobotModel
+    from rcilab.recording.run_summary import RunSummary
 
 Theme = Literal["light", "dark"]
 
@@ -43,6 +45,8 @@ class RunsFolder:
     """Number of newest ones to keep."""
     asked: bool = False
     """Whether deleting awaits a second confirmation."""
+    runs: tuple[RunSummary, ...] = ()
+    """The newest ones, newest first."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -69,6 +73,8 @@ class UiState(AppState):
     link: LinkQuestion | None = None
     """The link that replaces something once its page has confirmed that."""
     folder: RunsFolder = RunsFolder()
+    replay: Replay | None = None
+    """A recorded run that is shown in place of the robot; nothing can be executed meanwhile."""
     export: Export | None = None
     """The export in progress."""
     busy: Message | None = None

@@ -13,6 +13,8 @@ from __future__ import annotations
 import struct
 import zlib
 from dataclasses import dataclass
+from os import SEEK_END
+from typing import IO
 
 from rcilab.core.errors import InvalidValueError, VersionMismatchError
 
@@ -81,6 +83,31 @@ def decode_chunks(content: bytes, name: str, max_chunks: int) -> tuple[Chunk, ..
         chunks.append(Chunk(kind.decode("ascii", errors="replace"), payload))
         offset += _BLOCK.size + length
     return tuple(chunks)
+
+
+def read_chunk_ends(stream: IO[bytes], kinds: tuple[str, ...]) -> dict[str, bytes]:
+    """Returns the last complete chunk of each of these kinds as it is in a file, without reading the others.
+
+    A checksum is not verified here; `decode_chunks` does that.
+
+    Args:
+        stream: The file, at its beginning.
+        kinds: Kinds of chunks.
+    """
+    size, found, offset = stream.seek(0, SEEK_END), dict[str, tuple[int, int]](), _HEADER.size
+    while offset + _BLOCK.size <= size:
+        stream.seek(offset)
+        kind, length, _ = _BLOCK.unpack(stream.read(_BLOCK.size))
+        if not kind.isalpha() or offset + _BLOCK.size + length > size:
+            break
+        found[kind.decode("ascii", errors="replace")] = offset, _BLOCK.size + length
+        offset += _BLOCK.size + length
+    chunks: dict[str, bytes] = {}
+    for kind in kinds:
+        if kind in found:
+            stream.seek(found[kind][0])
+            chunks[kind] = stream.read(found[kind][1])
+    return chunks
 
 
 def is_damaged(content: bytes, chunks: tuple[Chunk, ...]) -> bool:

@@ -48,6 +48,12 @@ def keep_newest(folder: str | PathLike[str], count: int) -> FolderStats:
     return FolderStats(deleted, freed)
 
 
+def newest_runs(folder: str | PathLike[str], count: int) -> list[tuple[Path, int, int]]:
+    """Returns path, time of the last change, [ns], and size, [bytes], of the newest runs of a folder, newest first."""
+    found = sorted(_runs(Path(folder)), reverse=True)[:count]
+    return [(path, changed, size) for changed, path, size in found]
+
+
 def _runs(folder: Path) -> list[tuple[int, Path, int]]:
     """Returns time of the last change, [ns], path and size, [bytes], of each run."""
     found: list[tuple[int, Path, int]] = []

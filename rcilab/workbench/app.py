@@ -27,6 +27,7 @@ from rcilab.app.program.path_actions import DrawPath
 from rcilab.app.request import Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.replay import replayed, require_replayable
+from rcilab.app.run.replay_actions import OpenRun
 from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.run.watch_actions import WatchActions
 from rcilab.app.run.watched_controller import WatchedController
@@ -254,6 +255,8 @@ class Workbench:
                 return CutWorkspace(page=page, axis=axis, at=at)
             case live.Entry(index):
                 return SelectEntry(page=page, index=index)
+            case live.Recorded(name):
+                return OpenRun(page=page, name=name)
             case live.Rows(index):
                 return ShowRows(page=page, index=index)
             case live.Draw(what):

@@ -156,6 +156,13 @@ class Entry(PageMessage):
     index: _Key
 
 
+class Recorded(PageMessage):
+    """A recorded run of the list was chosen."""
+
+    name: Annotated[str, msgspec.Meta(max_length=255)]
+    """Name of its file."""
+
+
 class Rows(PageMessage):
     """The list of waypoints was scrolled to rows that it does not have."""
 
@@ -211,6 +218,7 @@ _DECODER = msgspec.json.Decoder(
     | Branch
     | Condition
     | Entry
+    | Recorded
     | Rows
     | Draw
     | Edit

@@ -13,6 +13,7 @@ from rcilab.app.learn.learn_state import displayed_state
 from rcilab.app.run.played_motion import moment_played
 from rcilab.app.store import Store
 from rcilab.app.text import Text
+from rcilab.control_process.status import SupervisorStatus
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.views.viser_ext.persistent_tab import PersistentTab
 from rcilab.workbench.live import LiveChannel
@@ -60,7 +61,6 @@ if TYPE_CHECKING:
     import viser
 
     from rcilab.app.store import UiState
-    from rcilab.control_process import SupervisorStatus
 
 _PERIOD = 1.0 / 30.0  # [s] The display's rate, which leaves processor time to the robot.
 _AT_REST = 0.25  # [s] Interval of counters and clocks while nothing else changes.
@@ -184,14 +184,14 @@ class Renderer:
             self._theme = state.theme
             dress(self._server, state.theme)
         seen = displayed_state(state)
-        self._stage.show(displayed_state(state, scene=True), status, self._text)
+        self._stage.show(displayed_state(state, scene=True), _seen_status(state, status), self._text)
         self._marks.show(seen, self._text)
         is_whole = not self._can_wait(state, status)
         if is_whole:
             self._show_panels(state, seen, status)
         first = _RUN if state.watched else 0  # The tab of a page that opens.
         self._live.publish(
-            **status_values(seen, status, self._text, self._timeline.end),
+            **status_values(seen, status, self._text, self._timeline.end, state),
             marks=self._timeline.marks,
             tab=first,
             drawing=state.paths.drawing is not None,
@@ -214,7 +214,10 @@ class Renderer:
         self._closed_shown = now if is_all else self._closed_shown
         for number, panel in zip(self._tab_numbers, self._panels, strict=True):
             if is_all or number in opened:
-                panel.show(seen if panel is self._timeline else state, status)
+                if panel is self._timeline:
+                    panel.show(seen, _seen_status(state, status))
+                else:
+                    panel.show(state, status)
 
     def _build(self, state: UiState) -> None:
         """Creates the panels again: another language or unit changes texts, another arm its joints."""
@@ -235,7 +238,7 @@ class Renderer:
                     self._tab_numbers.append(number)
         self._timeline = TimelinePanel(self._text, self._ask)
         with self._tabs[-1].rebuild(self._text("panel.timeline")):
-            self._timeline.build(gui, state)
+            self._timeline.build(gui, displayed_state(state))
         self._panels.append(self._timeline)
         self._tab_numbers.append(len(_TABS))
 
@@ -278,4 +281,9 @@ def _traits(status: SupervisorStatus) -> tuple[object, ...]:
 
 def _looks(state: UiState) -> tuple[object, ...]:
     """Returns the values that the panels are created for."""
-    return state.language, state.units, state.model.name
+    return state.language, state.units, state.model.name, displayed_state(state).model.name
+
+
+def _seen_status(state: UiState, status: SupervisorStatus) -> SupervisorStatus:
+    """Returns the status for scene and timeline: beside an opened run, the robot is not shown."""
+    return status if state.replay is None else SupervisorStatus()

@@ -10,7 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rcilab.app.learn.learn_state import displayed_state
+from rcilab.app.run.replay import replayed_pose
 from rcilab.app.run.run_recorder import whole_recording
+from rcilab.app.store import RunsFolder
 from rcilab.app.view_actions import SetView
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
@@ -64,6 +67,30 @@ def test_a_fault_has_a_flag_with_its_name_in_the_plots(page):
     assert page.tab.locator(".rl-fault span:visible").all_inner_texts() == [Fault.COLLISION.manual_name]
     page.bench.store.update(recording=None)
     page.wait(lambda: flags.count() == 0, "none without the run")
+
+
+def test_a_recorded_run_is_opened_from_the_list_and_left_again(page, tmp_path):
+    run = some_run()
+    cycles = run.cycles.copy()
+    cycles["faults"][len(cycles) // 2 :] = 1 << Fault.COLLISION
+    replace(run, cycles=cycles).save(tmp_path / "a.rcirun")
+    page.bench.store.update(runs=tmp_path, record=False)
+    page.open_tab("Run")
+    page.unfold("Recording")
+    row = page.tab.locator('[data-run="a.rcirun"]')
+    page.wait(lambda: row.count() == 1 and Fault.COLLISION.manual_name in row.inner_text(), "the run in the list")
+    row.click()
+    page.wait(lambda: page.state.replay is not None, "the run", 30)
+    opened = displayed_state(page.state)
+    there = opened.model.forward(replayed_pose(opened)).matrix  # With the tool of the run.
+    page.wait(lambda: np.allclose(page.tool_pose("live"), there, atol=1e-4), "the recorded arm at its fault")
+    page.wait(lambda: page.tab.locator(".rl-fault span:visible").count() == 1, "the flag")
+    assert page.tab.get_by_text("Recorded run:").is_visible()
+    assert page.button("Execute").is_disabled()
+    page.button("Back to the robot").first.click()
+    page.wait(lambda: page.state.replay is None, "the robot")
+    page.wait(lambda: page.shows("live", page.status.q), "the robot in the scene")
+    page.bench.store.update(runs=None, record=True, folder=RunsFolder())
 
 
 def test_a_long_export_is_cancelled_and_the_next_one_comes(page, tmp_path):

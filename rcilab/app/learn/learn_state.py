@@ -59,7 +59,9 @@ class LearnState:
 
 
 def displayed_state(state: UiState, *, scene: bool = False) -> UiState:
-    """Returns the state for timeline, or scene: with the displayed fault, if there is one, in place of the plan."""
+    """Returns the state for timeline, or scene: with the opened run, or the displayed fault, in place of the plan."""
+    if state.replay is not None:
+        return state.replay.over(state)
     show = state.learn.show
     if show is None:
         return state

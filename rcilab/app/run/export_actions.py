@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from tempfile import TemporaryFile
 from typing import IO, TYPE_CHECKING, TypeAlias
 
+from rcilab.app.learn.learn_state import displayed_state
 from rcilab.app.request import Handlers, Request
 from rcilab.app.status_text import explain_error
 from rcilab.core.errors import RcilabError
@@ -80,7 +81,7 @@ class ExportActions:
 
     def export(self, request: ExportRun) -> None:
         """Starts an export; refused while another one is in progress."""
-        recording = self._store.state.last_run
+        recording = displayed_state(self._store.state).last_run
         run = None if recording is None else recording.run
         if request.ending not in ENDINGS:
             return

@@ -28,6 +28,8 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns what prevents Execute, or None if it may be pressed."""
     if state.watched:
         return message("ready.watched", address=state.watched)
+    if state.replay is not None:
+        return message("ready.replay")
     if state.busy is not None:
         return message("ready.busy")
     missing = explain_missing_robot(state.model, is_virtual=state.target == "virtual")

@@ -2,27 +2,76 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rcilab.app.cell.cell_state import CellState
 from rcilab.app.goal.goal import goal_at
+from rcilab.app.learn.learn_state import LearnState
 from rcilab.app.planning import build_plan_view
+from rcilab.app.program.program_draft import ProgramState
 from rcilab.app.run.run_recorder import whole_recording
+from rcilab.app.scene.scene_extras import SceneState
 from rcilab.conformance.check import check
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import UsageError
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.recording.client_report import check_client
+from rcilab.recording.run import load_run
 from rcilab.recording.sent_motion import with_soft_limits
 
 if TYPE_CHECKING:
+    from rcilab.app.run.recording import Recording
     from rcilab.app.store import UiState
     from rcilab.core.arrays import JointVector
     from rcilab.model.robot_model import RobotModel
     from rcilab.recording.run import Run
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Replay:
+    """A recorded run that the page shows in place of its robot."""
+
+    shown: UiState
+    """The state of a page that shows only this run."""
+
+    @property
+    def recording(self) -> Recording:
+        """The run."""
+        assert self.shown.recording is not None
+        return self.shown.recording
+
+    def over(self, state: UiState) -> UiState:
+        """Returns a state with the run in place of what the page plans; views and settings are those of the page."""
+        shown = self.shown
+        return replace(
+            state, model=shown.model, setup=shown.setup, cell=shown.cell, goal=shown.goal, recording=shown.recording,
+            last_run=shown.last_run, plan=shown.plan, program=shown.program, scene=shown.scene, learn=shown.learn,
+            plot_joint=min(state.plot_joint, shown.model.n),
+        )  # fmt: skip
+
+
+def open_replay(file: Path, settings: UiState) -> Replay:
+    """Returns a run of a file for the page; its check takes seconds for a long one.
+
+    Args:
+        file: The run.
+        settings: A state, for the settings of the page.
+
+    Raises:
+        InvalidValueError: The file cannot be read.
+        UsageError: It cannot be replayed.
+    """
+    run = load_run(file)
+    model = require_replayable(run)
+    empty = replace(
+        settings, model=model, goal=goal_at(model, model.home), program=ProgramState(), scene=SceneState(),
+        learn=LearnState(), plan=None,
+    )  # fmt: skip
+    return Replay(shown=replayed(empty, run, str(file)))
 
 
 def require_replayable(run: Run) -> RobotModel:
@@ -38,8 +87,8 @@ def require_replayable(run: Run) -> RobotModel:
     return run.model
 
 
-def replayed(state: UiState, run: Run) -> UiState:
-    """Returns a state that shows a run."""
+def replayed(state: UiState, run: Run, file: str = "") -> UiState:
+    """Returns a state that shows a run; `file`: that of the run, "" without one."""
     model = with_soft_limits(require_replayable(run), run)
     if run.has_playout:
         report = check_client(run)
@@ -51,7 +100,7 @@ def replayed(state: UiState, run: Run) -> UiState:
     goal = goal_at(model, motion.goal)
     wanted = state.setup.wanted.updated(RobotConfiguration(tool=model.T_flange_tool, load=model.load))
     setup = replace(state.setup, wanted=wanted, touched=frozenset({"tool", "load"}))
-    recording = whole_recording(run)
+    recording = whole_recording(run, file)
     shown = replace(
         state, model=model, setup=setup, cell=CellState(cell=run.cell), goal=goal, recording=recording,
         last_run=recording, playhead=0.0,

@@ -1,14 +1,18 @@
-// Rows that are clicked, or chosen with Enter or the space bar: those of the Check tab, and the entries of the Cell tab.
+// Rows that are clicked, or chosen with Enter or the space bar: those of the Check tab, the entries of the
+// Cell tab, and recorded runs.
 (() => {
   "use strict";
-  const rowOf = (node) => node instanceof Element ? node.closest(".rl-pick :is([data-condition], [data-entry])") : null;
-  const nameOf = (row) => row.dataset.condition === undefined ? `[data-entry="${row.dataset.entry}"]` : `[data-condition="${CSS.escape(row.dataset.condition)}"]`;
+  const rowOf = (node) => node instanceof Element ? node.closest(".rl-pick :is([data-condition], [data-entry], [data-run])") : null;
+  const KINDS = ["condition", "entry", "run"], kindOf = (row) => KINDS.find((kind) => row.dataset[kind] !== undefined);
+  const nameOf = (row) => `[data-${kindOf(row)}="${CSS.escape(row.dataset[kindOf(row)])}"]`;
   let kept = null;  // Every answer exchanges the rows' HTML; the focus stays on the row.
 
   const choose = (row) => {
     kept = nameOf(row);
-    const { condition, entry } = row.dataset;
-    const detail = condition === undefined ? { kind: "entry", index: Number(entry) } : { kind: "condition", id: condition };
+    const { condition, entry, run } = row.dataset;
+    const detail = {
+      condition: { kind: "condition", id: condition }, entry: { kind: "entry", index: Number(entry) }, run: { kind: "recorded", name: run },
+    }[kindOf(row)];
     window.dispatchEvent(new CustomEvent("rl-act", { detail }));
   };
 
@@ -21,6 +25,7 @@
     if (!row) return;
     const next = { ArrowUp: row.previousElementSibling, ArrowDown: row.nextElementSibling }[event.key];
     if (next && row.dataset.entry !== undefined) { next.focus(); choose(next); }
+    else if (next && row.dataset.run !== undefined) next.focus();  // It takes a while to open: Enter does.
     else if (event.key === "Enter" || event.key === " ") choose(row);
     else return;
     event.preventDefault();

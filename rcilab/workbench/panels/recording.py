@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app.learn.learn_state import displayed_state
 from rcilab.app.run.export_actions import ENDINGS, CancelExport, ExportRun
+from rcilab.app.run.replay_actions import CloseRun
 from rcilab.app.text import Text
 from rcilab.app.view_actions import SetRecording
+from rcilab.core.fault import name_faults
 from rcilab.recording.tracking_text import error_rows, tracking_notes
-from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, esc_names, on_press
 
 if TYPE_CHECKING:
     from rcilab.app.run.recording import Recording
@@ -51,11 +56,17 @@ class RecordingPanel:
             box = gui.add_checkbox(text("record.every"), state.record, hint=text("record.every_hint"))
             self._record = BoundControl(box, ask, lambda v, p: SetRecording(page=p, on=bool(v)))
             self._where = Html(gui)
+            self._runs = Html(gui)
+            self._back = gui.add_button(text("replay.back"), icon="arrow-back-up", visible=False)
+            on_press(self._back, ask, lambda page: CloseRun(page=page))
         self._drawn = None
         self._summary.show(f'<p class="rl-note">{esc(text("record.nothing"))}</p>')
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the recording and the export in progress."""
+        self._runs.show(runs_html(state, self._text))
+        self._back.visible = state.replay is not None
+        state = displayed_state(state)
         text, export = self._text, state.export
         recording = state.recording if state.recording is not None else state.last_run
         if recording is not self._drawn:
@@ -87,6 +98,32 @@ def summary_html(recording: Recording | None, text: Text) -> str:
     )
     table = f'<table class="rl-table"><tr>{"".join(f"<th>{esc(title)}</th>" for title in head)}</tr>{rows}</table>'
     return table + "".join(f'<p class="rl-note">{esc(note)}</p>' for note in tracking_notes(run, tracking, text))
+
+
+def runs_html(state: UiState, text: Text) -> str:
+    """Returns the list of the newest recorded runs, newest first: arm, start, end and duration; "" without one."""
+    runs = state.folder.runs
+    if not runs:
+        return ""
+    opened = None if state.replay is None else Path(state.replay.recording.file).name
+    chosen = next((index for index, run in enumerate(runs) if run.name == opened), None)
+    rows: list[str] = []
+    for index, run in enumerate(runs):
+        start = time.localtime(run.started_ns * 1e-9)
+        when = time.strftime("%m-%d %H:%M:%S", start) if run.started_ns else "—"
+        ended = name_faults(run.faults) or text(f"replay.{run.ended}")
+        tone = ' class="rl-fails"' if run.ended == "fault" else ""
+        rows.append(
+            f'<div class="rl-entry rl-run" role="option" tabindex="{0 if index == (chosen or 0) else -1}" '
+            f'data-run="{esc(run.name)}" aria-selected="{str(index == chosen).lower()}" title="{esc(run.name)}">'
+            f"<span>{esc(when)}</span><span>{esc(run.model)} · <i{tone}>{esc_names(ended)}</i></span>"
+            f"<span>{run.duration:.1f} s</span></div>"
+        )
+    label = esc(text("replay.list"))
+    return (
+        f'<p class="rl-rowname">{label}</p><div class="rl-branches rl-entries rl-pick" role="listbox" '
+        f'aria-label="{label}">{"".join(rows)}</div>'
+    )
 
 
 def progress_html(ending: str, share: float, text: Text) -> str:

@@ -41,8 +41,18 @@ _KEYS = (
 """Keys, and buttons of a gamepad and a SpaceMouse, in the order of their list."""
 
 
-def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_end: float) -> dict[str, Any]:
-    """Returns the contents of the page's bar, for `LiveChannel.publish`."""
+def status_values(
+    state: UiState, status: SupervisorStatus, text: Text, cursor_end: float, live: UiState | None = None
+) -> dict[str, Any]:
+    """Returns the contents of the page's bar, for `LiveChannel.publish`.
+
+    Args:
+        state: What scene and timeline show.
+        status: That of the robot.
+        text: The catalogue.
+        cursor_end: End of the plots' time axis, [s].
+        live: The robot's state, if they show something else.
+    """
     values: dict[str, Any] = {
         "language": state.language,
         "stop": text("stop.label"),
@@ -66,7 +76,7 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         "lost": text("bar.lost"),
         "quality": state.quality,
         "software": text("bar.software") if state.quality == "full" else "",
-        "chips": _chips(state, status, text),
+        "chips": _chips(live or state, status, text),
         "cursor": _cursor(state, status, cursor_end),
         "theme": state.theme,
         "viser": text("bar.viser"),
@@ -182,5 +192,6 @@ def _chip(text: Text, name: str, value: str, tone: str = "", *, hint: str = "") 
 def _cursor(state: UiState, status: SupervisorStatus, end: float) -> dict[str, float] | None:
     if state.plan is None or end <= 0.0:
         return None
-    t = played_at(state, time_shown(state, status))
+    shown = state.playhead * state.plan.motion.duration if state.replay is not None else time_shown(state, status)
+    t = played_at(state, shown)
     return {"share": round(min(max(t / end, 0.0), 1.0), 4)}

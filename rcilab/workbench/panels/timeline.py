@@ -9,6 +9,7 @@ from rcilab.app.program.program_draft import describe_place
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.played_motion import played_at, scaled_motion_of
 from rcilab.app.run.readiness import connection_note, is_plan_current, time_shown
+from rcilab.app.run.replay_actions import CloseRun
 from rcilab.app.text import Text
 from rcilab.app.view_actions import PLOTS, RATES, Play, Seek, SetView, ShowPlot, has_plot
 from rcilab.core.clock import CYCLE_TIME
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
-_BANNER = 72  # [px] Height of the line about a recorded run.
+_BANNER, _BACK = 72, 40  # [px] Height of the line about a recorded run, and of the button below it.
 
 
 class TimelinePanel:
@@ -59,6 +60,8 @@ class TimelinePanel:
         with gui.add_folder(text("timeline.show"), expand_by_default=False):
             self._build_choices(gui, state)
         self._banner = Html(gui)
+        self._back = gui.add_button(text("replay.back"), icon="arrow-back-up", visible=False)
+        on_press(self._back, ask, lambda page: CloseRun(page=page))
         self._readout = Html(gui)
         self._plots.build(gui, state)
 
@@ -66,6 +69,7 @@ class TimelinePanel:
         """Moves the scrubber; redraws plots when plan, recording or choice have changed."""
         text, banner = self._text, replay_html(state, status, self._text) or _demo_html(state, self._text)
         self._banner.show(banner)
+        self._back.visible = state.replay is not None
         self._play.label = text("timeline.hold" if state.playing else "timeline.play")
         self._play.disabled = state.plan is None
         duration = 0.0 if state.plan is None else state.plan.motion.duration
@@ -77,7 +81,7 @@ class TimelinePanel:
         for name, box in self._choices.items():
             box.show(name in state.plots)
         self._readout.show(self._read(state, status))
-        self._plots.show(state, _BANNER if banner else 0)
+        self._plots.show(state, (_BANNER if banner else 0) + (_BACK if state.replay is not None else 0))
 
     def _build_choices(self, gui: Any, state: UiState) -> None:
         text, ask = self._text, self._ask

@@ -87,7 +87,8 @@ class Stage:
         self._show_candidate(state, status, live)
         self._show_plan(state, status, live)
         is_with_arm = is_moving(status) or _apart(state.goal.q, live) <= _SAME_POSE
-        self._goal.show(state, text, is_hidden=bool(state.watched) and is_with_arm)
+        is_hidden = (bool(state.watched) and is_with_arm) or state.replay is not None
+        self._goal.show(state, text, is_hidden=is_hidden)
         self._elbow.show(state, status, text)
         self._ribbon.show(state, text)
         self._extras.show(state)
