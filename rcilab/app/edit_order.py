@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias
 
 Feature: TypeAlias = Literal["goal", "program", "cell", "setup"]
-FEATURES: tuple[Feature, ...] = get_args(Feature)
 _LONGEST = 500
 """Largest number of edits in the order; a feature keeps fewer."""
 

@@ -20,11 +20,12 @@ def resolve_signals(program: Program, signals: Sequence[Signal], tool: Tool | No
 
 def _resolved(number: int, waypoint: Waypoint, signals: Sequence[Signal], tool: Tool | None) -> Waypoint:
     try:
-        if waypoint.type == "tool":
-            return replace(waypoint, signal=_channel(_jaws_signal(tool), "output", signals))
-        if isinstance(waypoint.signal, str):
-            kind: SignalKind = "output" if waypoint.type == "output" else "input"
-            return replace(waypoint, signal=_channel(waypoint.signal, kind, signals))
+        name = waypoint.signal
+        if waypoint.type == "tool" and name is None:
+            name = _jaws_signal(tool)
+        if isinstance(name, str):
+            kind: SignalKind = "output" if waypoint.type in ("output", "tool") else "input"
+            return replace(waypoint, signal=_channel(name, kind, signals))
     except InvalidValueError as error:
         raise named_value(number, waypoint.type, error) from error
     return waypoint

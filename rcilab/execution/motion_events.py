@@ -109,7 +109,7 @@ class EventQueue:
                 self._done += 1
                 cycle = event.cycle
                 continue
-            if (now - (self._began or now)) * CYCLE_TIME >= event.timeout:
+            if self._began is not None and (now - self._began) * CYCLE_TIME >= event.timeout:
                 raise self._late(event)
             return event.cycle
         return cycle

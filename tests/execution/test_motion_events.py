@@ -101,6 +101,12 @@ def test_an_input_that_does_not_come_ends_the_program_in_words(robot, mode):
     robot.move_j(MODEL.home, 0.8)
 
 
+def test_a_program_may_begin_with_a_wait(robot):
+    with pytest.raises(DeadlineError, match=r"step 1: input DI0_1 was not on within 0\.1 s"):
+        robot.execute(plan(Waypoint.await_input(1, timeout=0.1), GO))
+    assert np.allclose(robot.state.q_c, MODEL.home, atol=1e-6)
+
+
 @pytest.mark.parametrize("level", [True, False])
 def test_a_block_ends_with_its_input(robot, level):
     robot.simulation.set_input(0, level)

@@ -172,6 +172,12 @@ def test_what_is_wrong_with_a_step_is_said(act, expected):
         act()
 
 
+def test_the_jaws_have_their_own_output_unless_the_step_names_one():
+    cell = Cell.example("machine_tending")
+    steps = (Waypoint.use_tool("close"), Waypoint(type="tool", signal="close chuck"), Waypoint(type="tool", signal=5))
+    assert [step.signal for step in cell.resolve(program(*steps)).waypoints] == [2, 1, 5]
+
+
 def test_a_block_that_may_be_left_ends_at_one_place():
     with pytest.raises(PlanningError, match=r"waypoint 1 \(repeat\): its repetitions end at different positions"):
         plan(Waypoint.repeat(2, until=0), Waypoint.retreat(0.02), Waypoint.end())
