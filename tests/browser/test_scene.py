@@ -261,8 +261,7 @@ def test_a_phone_has_the_scene_above_the_panel_with_status_stop_program_and_run(
         assert (bottom, panel[3]) == (panel[1], 844), "the panel below the scene"
         assert bottom - top > 300
         for name in ("#rl-stop", '.rl-chip[data-id="phase"]', "#rl-toolbar"):
-            edges = tab.evaluate(box, name)
-            assert 0 <= edges[0] < edges[2] <= 390
+            page.wait(lambda name=name: _is_inside(tab.evaluate(box, name)), f"{name} to be inside")
         for name in ("Program", "Run"):
             tab.get_by_role("tab", name=name).click()
             tab.wait_for_function(
@@ -274,6 +273,10 @@ def test_a_phone_has_the_scene_above_the_panel_with_status_stop_program_and_run(
         tab.set_viewport_size(size)
         page.wait_until_drawn()
         page.open_tab("Jog")
+
+
+def _is_inside(edges: list[float]) -> bool:
+    return 0 <= edges[0] < edges[2] <= 390
 
 
 _FULL_WIDTH = """() => { const panel = document.querySelector('#root .mantine-Paper-root[style*="20em"]');

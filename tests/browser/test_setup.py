@@ -30,6 +30,7 @@ def test_a_tool_is_typed_the_controller_reports_it_and_the_box_is_dragged_and_ta
     page.wait(lambda: pending_parts(page.state, page.status) == (), "the controller to have the box")
     page.button("Undo").click()
     page.wait(lambda: np.allclose(faces(page.state.setup.wanted.box), before), "the box as it was")
+    page.wait(lambda: pending_parts(page.state, page.status) == (), "the controller to have the box as it was")
     page.button("Undo").click()
     page.wait(lambda: page.state.setup.wanted.tool.position[2] == 0.0, "the tool as it was")
     page.wait(lambda: page.button("Undo").is_disabled(), "nothing more to undo")

@@ -118,7 +118,7 @@ def test_waypoints_in_a_frame_are_those_of_the_cell(files, capsys):
     for argv in (["check", program], ["run", program, "--robot", "rci://127.0.0.1:9", "--yes"]):
         assert main(argv) == 2
         (line,) = capsys.readouterr().err.splitlines()
-        assert line == "rcilab: tray.json has waypoints in frames (tray): add --cell CELL, the cell that has them"
+        assert line == "rcilab: tray.json needs its cell (tray): add --cell CELL, the cell that has them"
     assert main(["check", program, "--cell", str(files / "free.zip")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     expected = "tray.json, line 8, waypoint 1 (joint), frame: 'tray' does not exist; there are: world"
