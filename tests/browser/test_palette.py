@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rcilab.app.cell.cell_actions import EditCell
+from rcilab.app.setup.setup_actions import PressSetup
 from rcilab.app.view_actions import SetView
 
 
@@ -19,10 +20,15 @@ def search(page):
         page.tab.wait_for_timeout(100)
         return page.tab.locator("#rl-commands [role=option] b").all_inner_texts()
 
+    tool = page.state.setup.wanted.tool
     yield find
     page.bench.dispatcher.ask(EditCell(what="clear"))
+    if page.state.setup.wanted.tool is not tool:  # That of an example.
+        page.bench.dispatcher.ask(PressSetup(what="undo"))
     page.bench.dispatcher.ask(SetView(name="theme", value="light"))
     page.bench.dispatcher.ask(SetView(name="language", value="en"))
+    page.wait(lambda: page.state.setup.wanted.tool.is_close(tool), "the tool of before")
+    page.wait(lambda: page.chip("where").startswith("virtual"), "the words of before")
 
 
 def test_examples_options_switches_tabs_and_views_are_used_by_keys(page, search):
