@@ -45,7 +45,7 @@ MOTION_TIME = 300.0  # [s] Longest motion that fits into the block.
 MOTION_ROWS = round(MOTION_TIME / CYCLE_TIME) + 1
 OPERATOR_TIMEOUT = 2.0  # [s] A motion ends after this time without an operator (workbench: control lock).
 MESSAGE_SLOTS = 16
-MESSAGE_SIZE = 32768  # [bytes] The largest request, a motion with 500 events, needs 22 000.
+MESSAGE_SIZE = 32768  # [bytes] The largest message, the reply to a motion with 1000 waits, needs 21 100.
 
 _HEADER = struct.Struct("<8sIIIIQ")  # magic, version, n, size of a cycle, ring capacity, total size
 _SETTINGS_SIZE = 4 * PAGE
